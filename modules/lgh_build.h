@@ -1,0 +1,9 @@
+// Sizes of the lighting grid hierarchy's buffers (see lgh_build.c).
+#pragma once
+
+#include "settings.h"
+#include "shaders/shared.h"
+
+uint32_t lgh_mask_words(uint32_t exponent); // vertex masks of the exponents 0..exponent
+uint32_t lgh_cell_words(uint32_t exponent); // mask of the cells of one exponent
+uint32_t lgh_capacity(const render_settings *settings); // grid lights of all levels

@@ -1,0 +1,19 @@
+// The modules, one init each. modules.c calls them in frame order: the table of contents of the renderer.
+#pragma once
+
+#include "renderer.h"
+
+bool modules_init(renderer *r); // false on failure (logged)
+
+bool acceleration_init(renderer *r);
+bool vpl_trace_init(renderer *r);
+bool lgh_build_init(renderer *r);
+bool gbuffer_init(renderer *r);
+bool direct_light_init(renderer *r);
+bool light_volume_init(renderer *r);
+bool shadow_init(renderer *r);
+bool interleave_init(renderer *r);
+bool svgf_init(renderer *r);
+bool taa_init(renderer *r);
+bool composite_init(renderer *r);
+bool tonemap_init(renderer *r);

@@ -1,0 +1,104 @@
+// The renderer: a world of entities (nodes, lights, passes), the scene on the GPU, and a frame graph rebuilt each frame
+// from the pass entities. An engine embeds it like this:
+//
+//     gpu *gpu = gpu_create(&(gpu_desc){0});
+//     scene_data *scene = scene_load("sponza.gltf");
+//     renderer *r = renderer_create(gpu, scene, &settings);
+//     r->camera = renderer_camera_of_scene(r, 0);
+//     renderer_frame(r); // until it is good enough
+//     gpu_image radiance = frame_graph_find_image(r->graph, "radiance");
+//
+// Names in the frame graph (images are width x height unless said otherwise; light is "radiance over albedo": what a
+// white Lambertian surface would send out, in nits, so that radiance = albedo * light):
+//
+//   tlas               acceleration  the scene                                         acceleration
+//   vpls               vpl[vpls]                                                       vpl_trace
+//   lgh_header         lgh_header                                                      lgh_build
+//   lgh_lights         grid_light[]  merged, top level first                           lgh_build
+//   lgh_sums           lgh_sums[]    the same order; with lgh_masks, lgh_ranks, lgh_vertices: see shaders/lgh.glsl.h
+//   lgh_samples        uvec4[]       VPL slots at which shadow rays to each light may end
+//   depth              D32           near/distance, 0 where nothing was drawn          gbuffer
+//   normals            RGBA16_SNORM  octahedral: xy geometric, zw shading, both towards the viewer
+//   albedo             RGBA16_UNORM  linear; a: 1 where something was drawn
+//   emission           RGBA32F       nits
+//   motion             RG16F         pixels from this frame's position to last frame's
+//   direct             RGBA32F       light of the punctual lights that are shadowed one by one   direct_light
+//   direct_u, direct_s RGBA32F       unshadowed and shadowed estimate of sampled direct light (absent when there is none)
+//   direct_analytic    RGBA32F       its unshadowed light without noise (absent when not known)
+//   indirect           RGBA32F       unshadowed; a: sum of the sampling weights f. Tiled when interleaved  light_volume
+//   lights_per_pixel   R32F          lights with a non-zero blending function; tiled like `indirect`
+//   reservoirs         buffer        shadow samples                                    light_volume
+//   indirect_gathered  RGBA32F       `indirect` over the tiles; absent without interleaving      interleave
+//   shadow_u, shadow_s RGBA32F       unshadowed and shadowed estimate of indirect light          shadow
+//   filter_geometry    RGBA32F       shading normal and view depth, 0 where nothing is; for filters  svgf
+//   X_u_filtered, X_s_filtered       for X = shadow, direct                            svgf
+//   X_ratio            RGBA16F       S / U in [0,1], after TAA where it is on          taa
+//   radiance           RGBA32F       nits                                              composite
+//   aov_direct, aov_indirect  RGBA32F  their parts of `radiance`, when exported         composite
+//   black, white       1x1           stand in for what is absent: read min(pixel, textureSize - 1)  composite
+//   exposure           float         factor before the tone curve                      tonemap
+//   display            RGBA8         tone-mapped sRGB                                  tonemap
+//   rays_vpl, rays_direct, rays_shadow  uint                                           counted by the pass that traces
+#pragma once
+
+#include "engine/ecs.h"
+#include "engine/frame_graph.h"
+#include "engine/gpu.h"
+#include "scene.h"
+#include "settings.h"
+
+typedef struct render_camera {
+    float eye[3], target[3], up[3]; // world; `up` need not be orthogonal
+    float yfov;                     // radians
+    float near_plane;               // metres, > 0
+} render_camera;
+
+enum { RENDERER_EXPORTS_MAX = 16 };
+
+typedef struct renderer {
+    gpu *gpu;
+    ecs_world *world;
+    frame_graph *graph;
+    const scene_data *scene;
+    render_settings settings; // may be changed between frames
+    render_camera camera;     // may be changed between frames
+    bool count_lights;        // makes `lights_per_pixel`
+    // Names kept beside "radiance" and "display" for frame_graph_find_*, left for transfer reads; "name|-" may be absent.
+    const char *exports[RENDERER_EXPORTS_MAX];
+    uint32_t export_count;
+    frame_constants constants; // of the current frame, as the shaders see them
+    component_type pass;       // render_pass
+    component_type pass_state; // what renderer_pass_add keeps of a pass, switched on or off
+    struct world_gpu *gpu_world; // modules/world.c
+    uint32_t frame;            // number of frames rendered so far
+    bool failed;               // in the current frame; systems set it after logging why
+} renderer;
+
+// The renderer keeps references to `gpu` and `scene`, which must outlive it. NULL on failure (logged).
+renderer *renderer_create(gpu *gpu, const scene_data *scene, const render_settings *settings);
+void renderer_destroy(renderer *r); // accepts NULL
+// Runs the world's systems once: one frame. False when the device or a declaration failed (logged).
+bool renderer_frame(renderer *r);
+
+// A camera of the scene, or with SCENE_NONE one that frames the whole scene.
+render_camera renderer_camera_of_scene(const renderer *r, uint32_t camera);
+
+// ---- For modules. A pass is an entity with a `render_pass` component and a component for its own state. Removing the
+// render_pass component switches the pass off.
+typedef struct render_pass {
+    const char *name;
+    void (*setup)(renderer *r, void *state); // declares frame graph passes; called every frame
+    void *state;
+} render_pass;
+
+// Adds a pass whose state is `state_size` zeroed bytes; `fini` (may be NULL) releases what the state holds.
+// Returns the state, which stays where it is for the renderer's life.
+void *renderer_pass_add(renderer *r, const char *name, size_t state_size, void (*setup)(renderer *r, void *state),
+                        void (*fini)(renderer *r, void *state));
+entity renderer_pass_find(const renderer *r, const char *name); // {0} when there is none
+
+// What several modules need to know of the current frame.
+bool renderer_has_indirect(const renderer *r);  // settings ask for indirect light, and there are VPLs and lights
+bool renderer_has_shadows(const renderer *r);   // indirect light with shadow samples
+// b in metres: no light's singularity is closer than this.
+float renderer_singularity(const renderer *r);

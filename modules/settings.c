@@ -1,0 +1,473 @@
+// The table of settings, and reading and printing values through it: see settings.h.
+#include "settings.h"
+
+#include "shaders/shared.h"
+
+#include <ctype.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { SIZE_MAX_PIXELS = 16384, EXPOSURE_MAX = 64 };
+
+render_settings render_settings_default(void)
+{
+    return (render_settings){
+        .width = 1280,
+        .height = 720,
+        .vpls = 100000,
+        .bounces = 3,
+        .alpha = 1,
+        .levels = 0,
+        .shadow_samples = 1,
+        .interleave = 1,
+        .emission = EMISSION_AB,
+        .end_point = END_POINT_VPL,
+        .build = LGH_BUILD_RESTRICT,
+        .s1 = LGH_S1_ORDERED,
+        .reservoirs = RESERVOIRS_EXACT,
+        .sampling = SAMPLING_IMPORTANCE,
+        .start_level = 1,
+        .sample_s1 = false,
+        .filter = true,
+        .taa = true,
+        .singularity = 0.01f,
+        .only = ONLY_ALL,
+        .seed = 1,
+        .auto_exposure = true,
+        .exposure = 0,
+        .frames = 8,
+    };
+}
+
+// ---- Numbers. Stricter than strtod: no blanks, no hexadecimal, no "nan", nothing behind the number.
+
+static bool number_read(const char *text, double *value)
+{
+    if (!*text || strspn(text, "0123456789+-.eE") != strlen(text)) {
+        return false;
+    }
+    char *end;
+    *value = strtod(text, &end);
+    return *end == '\0';
+}
+
+// Clamped to what a long long holds, which no setting's range comes near. `*end` is the first character behind it.
+static bool integer_read(const char *text, long long *value, const char **end)
+{
+    const char *const digits = text + (*text == '-' || *text == '+');
+    if (!isdigit((unsigned char)*digits)) {
+        return false;
+    }
+    char *stop;
+    *value = strtoll(text, &stop, 10);
+    *end = stop;
+    return true;
+}
+
+static bool uint_read(const char *text, double min, double max, uint32_t *value, bool *out_of_range)
+{
+    const char *end;
+    long long number;
+    if (!integer_read(text, &number, &end) || *end) {
+        return false;
+    }
+    *out_of_range = (double)number < min || (double)number > max;
+    if (*out_of_range) {
+        return false;
+    }
+    *value = (uint32_t)number;
+    return true;
+}
+
+static bool float_read(const char *text, const setting_info *info, float *value, bool *out_of_range)
+{
+    double number;
+    if (!number_read(text, &number)) {
+        return false;
+    }
+    // In the range as a float too: 1e-60 rounds to 0.
+    const float rounded = (float)number;
+    *out_of_range = !(rounded >= info->min && number <= info->max) || (info->above_min && rounded <= info->min);
+    if (*out_of_range) {
+        return false;
+    }
+    *value = rounded;
+    return true;
+}
+
+// The shortest decimal that reads back to the same float.
+static void float_print(float value, char text[32])
+{
+    for (int digits = 1; digits <= 9; digits++) {
+        snprintf(text, 32, "%.*g", digits, (double)value);
+        if (strtof(text, NULL) == value) {
+            return;
+        }
+    }
+}
+
+// ---- Settings with a form of their own
+
+static bool size_read(render_settings *settings, const char *text, bool *out_of_range)
+{
+    const char *end;
+    long long width, height = 0;
+    if (!integer_read(text, &width, &end) || (*end == 'x' && !integer_read(end + 1, &height, &end)) || *end) {
+        return false;
+    }
+    // A lone number ("0") is a size that lacks its height, so it is refused as a value.
+    *out_of_range = width < 1 || height < 1 || width > SIZE_MAX_PIXELS || height > SIZE_MAX_PIXELS;
+    if (*out_of_range) {
+        return false;
+    }
+    settings->width = (uint32_t)width;
+    settings->height = (uint32_t)height;
+    return true;
+}
+
+static void size_print(const render_settings *settings, char text[32])
+{
+    snprintf(text, 32, "%ux%u", settings->width, settings->height);
+}
+
+static bool levels_read(render_settings *settings, const char *text, bool *out_of_range)
+{
+    if (strcmp(text, "auto") == 0) {
+        settings->levels = 0;
+        return true;
+    }
+    return uint_read(text, 1, LGH_EXPONENTS, &settings->levels, out_of_range);
+}
+
+static void levels_print(const render_settings *settings, char text[32])
+{
+    snprintf(text, 32, "%u", settings->levels);
+    if (settings->levels == 0) {
+        strcpy(text, "auto");
+    }
+}
+
+static bool interleave_read(render_settings *settings, const char *text, bool *out_of_range)
+{
+    uint32_t n = 0;
+    if (!uint_read(text, 1, 4, &n, out_of_range)) {
+        return false;
+    }
+    if (n == 3) {
+        *out_of_range = true;
+        return false;
+    }
+    settings->interleave = n;
+    return true;
+}
+
+static void interleave_print(const render_settings *settings, char text[32])
+{
+    snprintf(text, 32, "%u", settings->interleave);
+}
+
+static bool exposure_read(render_settings *settings, const char *text, bool *out_of_range)
+{
+    static const setting_info range = {.min = -EXPOSURE_MAX, .max = EXPOSURE_MAX};
+    const bool automatic = strcmp(text, "auto") == 0;
+    if (!automatic && !float_read(text, &range, &settings->exposure, out_of_range)) {
+        return false;
+    }
+    settings->auto_exposure = automatic;
+    return true;
+}
+
+static void exposure_print(const render_settings *settings, char text[32])
+{
+    float_print(settings->exposure, text);
+    if (settings->auto_exposure) {
+        strcpy(text, "auto");
+    }
+}
+
+// ---- The table
+
+static const char *const only_names[] = {
+    [ONLY_ALL] = "all",
+    [ONLY_DIRECT] = "direct",
+    [ONLY_INDIRECT] = "indirect",
+    [ONLY_INDIRECT_UNSHADOWED] = "indirect-unshadowed",
+    NULL,
+};
+static const char *const build_names[] = {
+    [LGH_BUILD_RESTRICT] = "restrict",
+    [LGH_BUILD_GATHER] = "gather",
+    [LGH_BUILD_SCATTER] = "scatter",
+    NULL,
+};
+static const char *const s1_names[] = {[LGH_S1_ORDERED] = "ordered", [LGH_S1_ATOMIC] = "atomic", NULL};
+static const char *const end_point_names[] = {
+    [END_POINT_CENTRE] = "centre",
+    [END_POINT_JITTER] = "jitter",
+    [END_POINT_VPL] = "vpl",
+    NULL,
+};
+static const char *const reservoir_names[] = {[RESERVOIRS_EXACT] = "exact", [RESERVOIRS_UNLOCKED] = "unlocked", NULL};
+static const char *const sampling_names[] = {
+    [SAMPLING_IMPORTANCE] = "importance",
+    [SAMPLING_UNIFORM] = "uniform",
+    NULL,
+};
+static const char *const emission_names[] = {
+    [EMISSION_DEMO] = "demo", [EMISSION_MEAN_NORMAL] = "mean-normal",
+    [EMISSION_A] = "A",       [EMISSION_B] = "B",
+    [EMISSION_AB] = "AB",     NULL,
+};
+
+#define FIELD(field) .offset = offsetof(render_settings, field)
+static const setting_info table[] = {
+    {.name = "size",
+     .type = SETTING_SPECIAL,
+     .read = size_read,
+     .print = size_print,
+     .expected = "WIDTHxHEIGHT, each from 1 to 16384 pixels",
+     .value_name = "WxH",
+     .help = "size in pixels, each 1 to 16384"},
+    {.name = "vpls",
+     .type = SETTING_UINT,
+     FIELD(vpls),
+     .max = 4000000,
+     .value_name = "N",
+     .help = "slots for virtual point lights, 0 to 4000000; 0: no indirect light"},
+    {.name = "bounces",
+     .type = SETTING_UINT,
+     FIELD(bounces),
+     .min = 1,
+     .max = 8,
+     .value_name = "N",
+     .help = "indirect bounces, 1 to 8"},
+    {.name = "alpha",
+     .type = SETTING_FLOAT,
+     FIELD(alpha),
+     .max = 16,
+     .above_min = true,
+     .value_name = "A",
+     .help = "radius of a grid light in cells of its level, up to 16; larger is smoother, slower and truer"},
+    {.name = "levels",
+     .type = SETTING_SPECIAL,
+     .read = levels_read,
+     .print = levels_print,
+     .expected = "\"auto\" or a whole number from 1 to 10",
+     .value_name = "auto|N",
+     .help = "levels of the hierarchy, 1 to 10"},
+    {.name = "shadow-samples",
+     .type = SETTING_UINT,
+     FIELD(shadow_samples),
+     .max = 8,
+     .value_name = "K",
+     .help = "shadow rays a pixel for indirect light, 0 to 8; 0: no indirect shadows"},
+    {.name = "interleave",
+     .type = SETTING_SPECIAL,
+     .read = interleave_read,
+     .print = interleave_print,
+     .expected = "1, 2 or 4",
+     .value_name = "1|2|4",
+     .help = "a pixel takes one in N x N of the grid lights"},
+    {.name = "emission",
+     .type = SETTING_ENUM,
+     FIELD(emission),
+     .values = emission_names,
+     .help = "how a grid light emits over directions"},
+    {.name = "end-point",
+     .type = SETTING_ENUM,
+     FIELD(end_point),
+     .values = end_point_names,
+     .help = "where a shadow ray ends within its grid light"},
+    {.name = "start-level",
+     .type = SETTING_UINT,
+     FIELD(start_level),
+     .max = 1,
+     .value_name = "0|1",
+     .help = "lowest level used; 0: the virtual point lights themselves"},
+    {.name = "sample-s1", .type = SETTING_TRUE, FIELD(sample_s1), .help = "level S1 takes part in the shadow sampling"},
+    {.name = "sampling",
+     .type = SETTING_ENUM,
+     FIELD(sampling),
+     .values = sampling_names,
+     .help = "choice of the lights that get shadow rays"},
+    {.name = "reservoirs",
+     .type = SETTING_ENUM,
+     FIELD(reservoirs),
+     .values = reservoir_names,
+     .help = "exact: the same picture each run; unlocked: the paper's races"},
+    {.name = "build",
+     .type = SETTING_ENUM,
+     FIELD(build),
+     .values = build_names,
+     .help = "how the levels above S1 are made; gather and scatter are the paper's"},
+    {.name = "s1",
+     .type = SETTING_ENUM,
+     FIELD(s1),
+     .values = s1_names,
+     .help = "how S1 is made; ordered: the same bits each run; atomic: the paper's"},
+    {.name = "singularity",
+     .type = SETTING_FLOAT,
+     FIELD(singularity),
+     .max = 1,
+     .value_name = "B",
+     .help = "b in 1 / (d^2 + b^2) as a fraction of the scene's radius, 0 to 1"},
+    {.name = "only", .type = SETTING_ENUM, FIELD(only), .values = only_names, .help = "render one part of the light"},
+    {.name = "no-filter", .type = SETTING_FALSE, FIELD(filter), .help = "leave the shadows unfiltered"},
+    {.name = "no-taa", .type = SETTING_FALSE, FIELD(taa), .help = "no temporal anti-aliasing of the shadows"},
+    {.name = "seed",
+     .type = SETTING_UINT,
+     FIELD(seed),
+     .max = UINT32_MAX,
+     .value_name = "N",
+     .help = "seed of all random numbers, 0 to 4294967295"},
+    {.name = "exposure",
+     .type = SETTING_SPECIAL,
+     .read = exposure_read,
+     .print = exposure_print,
+     .expected = "\"auto\" or a number from -64 to 64",
+     .value_name = "auto|EV",
+     .help = "the PNG shows radiance times 2^EV; auto: log-average at 0.18"},
+    {.name = "frames",
+     .type = SETTING_UINT,
+     FIELD(frames),
+     .min = 1,
+     .max = 1000000,
+     .value_name = "N",
+     .help = "frames rendered so that temporal history settles, 1 to 1000000; the last is written"},
+};
+#undef FIELD
+
+const setting_info *settings_table(uint32_t *count)
+{
+    *count = countof(table);
+    return table;
+}
+
+const setting_info *settings_find(const char *name)
+{
+    for (size_t i = 0; i < countof(table); i++) {
+        if (strcmp(table[i].name, name) == 0) {
+            return &table[i];
+        }
+    }
+    return NULL;
+}
+
+// ---- Reading and printing through the table
+
+static bool enum_read(const char *text, const char *const *names, uint32_t *value)
+{
+    for (uint32_t i = 0; names[i]; i++) {
+        if (strcmp(names[i], text) == 0) {
+            *value = i;
+            return true;
+        }
+    }
+    return false;
+}
+
+static bool switch_read(const char *text, bool when_on, bool *value)
+{
+    const bool on = !text || strcmp(text, "true") == 0;
+    if (!on && strcmp(text, "false") != 0) {
+        return false;
+    }
+    *value = on ? when_on : !when_on;
+    return true;
+}
+
+static bool value_read(render_settings *settings, const setting_info *info, const char *text, bool *out_of_range)
+{
+    void *const field = (char *)settings + info->offset;
+    switch (info->type) {
+    case SETTING_UINT:
+        return uint_read(text, info->min, info->max, field, out_of_range);
+    case SETTING_FLOAT:
+        return float_read(text, info, field, out_of_range);
+    case SETTING_ENUM:
+        return enum_read(text, info->values, field);
+    case SETTING_TRUE:
+        return switch_read(text, true, field);
+    case SETTING_FALSE:
+        return switch_read(text, false, field);
+    case SETTING_SPECIAL:
+        return info->read(settings, text, out_of_range);
+    }
+    return false;
+}
+
+// "one of a, b, c"
+static void names_print(const char *const *names, char *text, size_t size)
+{
+    size_t length = (size_t)snprintf(text, size, "one of");
+    for (uint32_t i = 0; names[i]; i++) {
+        length += (size_t)snprintf(text + length, size - length, "%s%s", i ? ", " : " ", names[i]);
+        assert(length < size);
+    }
+}
+
+static void expected_print(const setting_info *info, char *text, size_t size)
+{
+    switch (info->type) {
+    case SETTING_UINT:
+        snprintf(text, size, "a whole number from %.0f to %.0f", info->min, info->max);
+        break;
+    case SETTING_FLOAT:
+        snprintf(text, size, "a number %s %g and at most %g", info->above_min ? "greater than" : "of at least",
+                 info->min, info->max);
+        break;
+    case SETTING_ENUM:
+        names_print(info->values, text, size);
+        break;
+    case SETTING_TRUE:
+    case SETTING_FALSE:
+        snprintf(text, size, "no value, true or false");
+        break;
+    case SETTING_SPECIAL:
+        snprintf(text, size, "%s", info->expected);
+        break;
+    }
+}
+
+bool settings_set(render_settings *settings, const setting_info *info, const char *text, setting_error *error)
+{
+    const bool is_switch = info->type == SETTING_TRUE || info->type == SETTING_FALSE;
+    error->out_of_range = false;
+    if ((text || is_switch) && value_read(settings, info, text, &error->out_of_range)) {
+        return true;
+    }
+    char expected[128];
+    expected_print(info, expected, sizeof(expected));
+    if (text) {
+        // What was given is cut, so that the line stays whole.
+        snprintf(error->message, sizeof(error->message), "--%s: expected %s, got \"%.40s\"", info->name, expected,
+                 text);
+    } else {
+        snprintf(error->message, sizeof(error->message), "--%s: expected %s", info->name, expected);
+    }
+    return false;
+}
+
+void settings_get(const render_settings *settings, const setting_info *info, char text[32])
+{
+    const void *const field = (const char *)settings + info->offset;
+    switch (info->type) {
+    case SETTING_UINT:
+        snprintf(text, 32, "%u", *(const uint32_t *)field);
+        break;
+    case SETTING_FLOAT:
+        float_print(*(const float *)field, text);
+        break;
+    case SETTING_ENUM:
+        snprintf(text, 32, "%s", info->values[*(const uint32_t *)field]);
+        break;
+    case SETTING_TRUE:
+    case SETTING_FALSE:
+        strcpy(text, *(const bool *)field == (info->type == SETTING_TRUE) ? "true" : "false");
+        break;
+    case SETTING_SPECIAL:
+        info->print(settings, text);
+        break;
+    }
+}

@@ -1,0 +1,75 @@
+// Every setting of a render in one plain struct, and one table that describes them: the command line, --help, and later
+// suites and playback scripts are all read through the table.
+#pragma once
+
+#include "engine/base.h"
+
+typedef enum render_only { ONLY_ALL, ONLY_DIRECT, ONLY_INDIRECT, ONLY_INDIRECT_UNSHADOWED } render_only;
+typedef enum lgh_build_method { LGH_BUILD_RESTRICT, LGH_BUILD_GATHER, LGH_BUILD_SCATTER } lgh_build_method;
+typedef enum lgh_s1_method { LGH_S1_ORDERED, LGH_S1_ATOMIC } lgh_s1_method;
+typedef enum end_point { END_POINT_CENTRE, END_POINT_JITTER, END_POINT_VPL } end_point;
+typedef enum reservoir_method { RESERVOIRS_EXACT, RESERVOIRS_UNLOCKED } reservoir_method;
+typedef enum sampling_method { SAMPLING_IMPORTANCE, SAMPLING_UNIFORM } sampling_method;
+
+typedef struct render_settings {
+    uint32_t width, height; // pixels
+    uint32_t vpls; // slots, 0 to 4,000,000
+    uint32_t bounces; // indirect bounces, 1 to 8
+    float alpha; // r_l = alpha * h_l; > 0
+    uint32_t levels; // 0: automatic
+    uint32_t shadow_samples; // reservoirs and shadow rays per pixel, 0 to 8; 0: no indirect shadows
+    uint32_t interleave; // 1, 2 or 4
+    uint32_t emission; // EMISSION_*
+    uint32_t end_point;
+    uint32_t build;
+    uint32_t s1;
+    uint32_t reservoirs;
+    uint32_t sampling;
+    uint32_t start_level; // 0: the VPLs themselves are the lowest level; 1
+    bool sample_s1; // S1 (and S0) take part in the shadow sampling
+    bool filter;
+    bool taa;
+    float singularity; // b as a fraction of the scene's radius: 1 / (d^2 + b^2)
+    uint32_t only;
+    uint32_t seed;
+    bool auto_exposure;
+    float exposure; // EV, when not automatic
+    uint32_t frames; // rendered; the last is written
+} render_settings;
+
+render_settings render_settings_default(void);
+
+typedef enum setting_type {
+    SETTING_UINT,
+    SETTING_FLOAT,
+    SETTING_ENUM,
+    SETTING_TRUE,
+    SETTING_FALSE,
+    SETTING_SPECIAL
+} setting_type;
+typedef struct setting_error {
+    char message[256];
+    bool out_of_range; // the text has the right form, its value cannot be used; false: the text is not understood
+} setting_error;
+typedef struct setting_info {
+    const char *name; // "shadow-samples": the option without its dashes, and the key in files
+    setting_type type; // TRUE and FALSE: switches without a value that set the field so
+    size_t offset; // into render_settings
+    double min, max; // inclusive
+    bool above_min; // `min` itself is not allowed
+    const char *const *values; // SETTING_ENUM: names by value, NULL-terminated
+    // SETTING_SPECIAL reads and prints itself; `expected` completes "expected ...".
+    bool (*read)(render_settings *settings, const char *text, bool *out_of_range);
+    void (*print)(const render_settings *settings, char text[32]);
+    const char *expected;
+    const char *value_name; // for --help: "N", "WxH", "B"; NULL: the names of an enum, nothing for a switch
+    const char *help; // one line with the unit and the range; settings_get of the defaults gives the default
+} setting_info;
+// All settings, in the order of --help. `count` is written.
+const setting_info *settings_table(uint32_t *count);
+const setting_info *settings_find(const char *name); // NULL when unknown
+// Sets one from text ("100000", "AB", "1280x720", "auto"); switches take NULL, "true" or "false". On failure returns
+// false, changes nothing, and `error` says what was expected: `--alpha: expected ..., got "x"`.
+bool settings_set(render_settings *settings, const setting_info *info, const char *text, setting_error *error);
+// The value as text that settings_set reads back to the same value.
+void settings_get(const render_settings *settings, const setting_info *info, char text[32]);

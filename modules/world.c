@@ -1,0 +1,434 @@
+// The scene as entities, and what is extracted from them every frame: transforms, instances, bounds.
+#include "world.h"
+
+#include <float.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define CGLM_FORCE_DEPTH_ZERO_TO_ONE
+#include <cglm/cglm.h>
+
+struct world_state {
+    world_instance *listed; // instance_count instances as the entities came, of the last frame
+    world_instance *found; // of this frame
+    size_t listed_capacity, found_capacity, order_capacity, data_capacity;
+    bool *mesh_emits; // per mesh
+};
+
+void *world_buffer_reserve(renderer *r, gpu_buffer *buffer, const char *name, uint32_t binding, VkDeviceSize size)
+{
+    if (!buffer->id || gpu_buffer_size(r->gpu, *buffer) < size) {
+        gpu_buffer_destroy(r->gpu, *buffer);
+        const gpu_buffer_desc desc = {
+            .name = name,
+            .size = size,
+            .usage = VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_SHADER_DEVICE_ADDRESS_BIT |
+                     VK_BUFFER_USAGE_ACCELERATION_STRUCTURE_BUILD_INPUT_READ_ONLY_BIT_KHR,
+            .host = true,
+        };
+        *buffer = gpu_buffer_create(r->gpu, &desc);
+        if (!buffer->id)
+            return NULL;
+        if (binding != BINDING_NONE)
+            gpu_scene_bind_buffer(r->gpu, binding, *buffer);
+    }
+    return gpu_buffer_map(r->gpu, *buffer);
+}
+
+// ---- Entities
+
+static void scene_spawn(renderer *r)
+{
+    const scene_data *s = r->scene;
+    const world_gpu *w = r->gpu_world;
+    entity *entities = memory_alloc(max_u32(s->node_count, 1) * sizeof *entities);
+    for (uint32_t i = 0; i < s->node_count; i++) {
+        const scene_node *source = &s->nodes[i];
+        entities[i] = ecs_entity_create(r->world);
+        node_component *node = ecs_add(r->world, entities[i], w->node);
+        node->name = source->name;
+        node->parent = source->parent == SCENE_NONE ? (entity){0} : entities[source->parent];
+        memcpy(node->matrix, source->matrix, sizeof node->matrix);
+        if (source->mesh != SCENE_NONE)
+            *(mesh_component *)ecs_add(r->world, entities[i], w->mesh) = (mesh_component){source->mesh};
+        if (source->light != SCENE_NONE) {
+            const scene_light *from = &s->lights[source->light];
+            light_component *light = ecs_add(r->world, entities[i], w->light);
+            light->type = from->type;
+            memcpy(light->color, from->color, sizeof light->color);
+            light->inner_cone = from->inner_cone;
+            light->outer_cone = from->outer_cone;
+        }
+    }
+    free(entities);
+}
+
+entity world_sun_add(renderer *r, const float direction[3], float lux)
+{
+    const world_gpu *w = r->gpu_world;
+    const entity e = ecs_entity_create(r->world);
+    float x[3], y[3], z[3]; // light shines along -z
+    glm_vec3_negate_to((float *)direction, z);
+    glm_vec3_normalize(z);
+    glm_vec3_ortho(z, x);
+    glm_vec3_normalize(x);
+    glm_vec3_cross(z, x, y);
+    node_component *node = ecs_add(r->world, e, w->node);
+    node->name = "sun";
+    for (int k = 0; k < 3; k++) {
+        node->matrix[k] = x[k];
+        node->matrix[4 + k] = y[k];
+        node->matrix[8 + k] = z[k];
+    }
+    node->matrix[15] = 1;
+    light_component *light = ecs_add(r->world, e, w->light);
+    *light = (light_component){.type = LIGHT_DIRECTIONAL, .color = {lux, lux, lux}};
+    return e;
+}
+
+// ---- Transforms
+
+static void matrix_multiply(const float a[16], const float b[16], float product[16])
+{
+    mat4 left, right; // over-aligned, so copies
+    memcpy(left, a, sizeof left);
+    memcpy(right, b, sizeof right);
+    glm_mat4_mul(left, right, left);
+    memcpy(product, left, sizeof left);
+}
+
+// Parents first, each once a frame. A parent that is gone counts as the world.
+static void transform_update(renderer *r, entity e)
+{
+    const world_gpu *w = r->gpu_world;
+    const uint32_t stamp = r->frame + 1;
+    transform_component *transform = ecs_add(r->world, e, w->transform);
+    if (transform->stamp == stamp)
+        return;
+    const bool is_new = transform->stamp == 0;
+    transform->stamp = stamp;
+    const node_component *node = ecs_get(r->world, e, w->node);
+    const transform_component *parent = NULL;
+    if (ecs_get(r->world, node->parent, w->node)) {
+        transform_update(r, node->parent);
+        parent = ecs_get(r->world, node->parent, w->transform);
+        transform = ecs_get(r->world, e, w->transform); // may have moved
+    }
+    memcpy(transform->previous_world, transform->world, sizeof transform->world);
+    if (parent)
+        matrix_multiply(parent->world, node->matrix, transform->world);
+    else
+        memcpy(transform->world, node->matrix, sizeof transform->world);
+    if (is_new)
+        memcpy(transform->previous_world, transform->world, sizeof transform->world);
+}
+
+static void transforms_update(ecs_world *world, void *user)
+{
+    renderer *r = user;
+    for (ecs_iterator it = ecs_iterate(world, r->gpu_world->node); ecs_next(&it);)
+        transform_update(r, it.entity);
+}
+
+// ---- The order of instances
+
+typedef struct placed_instance {
+    world_instance instance;
+    float centre[3]; // world
+} placed_instance;
+
+static int placed_compare(const void *left, const void *right, void *axis)
+{
+    const placed_instance *a = left, *b = right;
+    const float x = a->centre[*(int *)axis], y = b->centre[*(int *)axis];
+    if (x != y)
+        return x < y ? -1 : 1;
+    return (a->instance.entity.id > b->instance.entity.id) - (a->instance.entity.id < b->instance.entity.id);
+}
+
+// Halves of n/2 along the longest axis, as the builders of top-level structures halve their list.
+static void median_split(placed_instance *items, uint32_t count)
+{
+    if (count <= 2)
+        return;
+    float extent[3];
+    for (int k = 0; k < 3; k++) {
+        float low = FLT_MAX, high = -FLT_MAX;
+        for (uint32_t i = 0; i < count; i++) {
+            low = fminf(low, items[i].centre[k]);
+            high = fmaxf(high, items[i].centre[k]);
+        }
+        extent[k] = high - low;
+    }
+    int axis = extent[1] > extent[0] ? 1 : 0;
+    axis = extent[2] > extent[axis] ? 2 : axis;
+    qsort_r(items, count, sizeof *items, placed_compare, &axis);
+    median_split(items, count / 2);
+    median_split(items + count / 2, count - count / 2);
+}
+
+static void box_add_point(box *b, const float p[3])
+{
+    for (int k = 0; k < 3; k++) {
+        b->min[k] = fminf(b->min[k], p[k]);
+        b->max[k] = fmaxf(b->max[k], p[k]);
+    }
+}
+
+// Adds the corners of `from`, transformed by the column-major `matrix`.
+static void box_add_transformed(box *b, const box *from, const float matrix[16])
+{
+    if (from->min[0] > from->max[0])
+        return;
+    for (int corner = 0; corner < 8; corner++) {
+        float p[3] = {matrix[12], matrix[13], matrix[14]};
+        for (int k = 0; k < 3; k++) {
+            const float x = corner >> k & 1 ? from->max[k] : from->min[k];
+            for (int row = 0; row < 3; row++)
+                p[row] += matrix[4 * k + row] * x;
+        }
+        box_add_point(b, p);
+    }
+}
+
+static const box box_empty = {{FLT_MAX, FLT_MAX, FLT_MAX}, {-FLT_MAX, -FLT_MAX, -FLT_MAX}};
+
+static void box_add_instance(const renderer *r, box *b, const world_instance *instance)
+{
+    const transform_component *transform = ecs_get(r->world, instance->entity, r->gpu_world->transform);
+    const scene_mesh *mesh = &r->scene->meshes[instance->mesh];
+    for (uint32_t i = 0; i < mesh->primitive_count; i++)
+        box_add_transformed(b, &r->gpu_world->primitive_boxes[mesh->first_primitive + i], transform->world);
+}
+
+static void instances_order(renderer *r)
+{
+    world_gpu *w = r->gpu_world;
+    placed_instance *items = memory_alloc(max_u32(w->instance_count, 1) * sizeof *items);
+    for (uint32_t i = 0; i < w->instance_count; i++) {
+        box b = box_empty;
+        box_add_instance(r, &b, &w->state->listed[i]);
+        items[i].instance = w->state->listed[i];
+        for (int k = 0; k < 3; k++)
+            items[i].centre[k] = 0.5f * b.min[k] + 0.5f * b.max[k];
+    }
+    median_split(items, w->instance_count);
+    memory_reserve((void **)&w->order, &w->state->order_capacity, w->instance_count, sizeof *w->order);
+    for (uint32_t i = 0; i < w->instance_count; i++)
+        w->order[i] = items[i].instance;
+    free(items);
+}
+
+// A mesh scaled to nothing is nowhere to be seen, and Vulkan wants the matrices of instances invertible.
+static bool matrix_is_invertible(const float m[16])
+{
+    float cross[3];
+    glm_vec3_cross((float *)m, (float *)m + 4, cross);
+    return fabsf(glm_vec3_dot(cross, (float *)m + 8)) >= FLT_MIN;
+}
+
+// Lists the drawable instances; true when they are others than in the last frame.
+static bool instances_find(renderer *r)
+{
+    world_gpu *w = r->gpu_world;
+    struct world_state *state = w->state;
+    const size_t limit = ecs_count(r->world, w->mesh);
+    memory_reserve((void **)&state->found, &state->found_capacity, limit, sizeof *state->found);
+    uint32_t count = 0;
+    for (ecs_iterator it = ecs_iterate(r->world, w->mesh); ecs_next(&it);) {
+        const uint32_t mesh = ((mesh_component *)it.component)->mesh;
+        assert(mesh < w->blas_count);
+        const transform_component *transform = ecs_get(r->world, it.entity, w->transform);
+        if (w->blas[mesh].id && transform && matrix_is_invertible(transform->world))
+            state->found[count++] = (world_instance){it.entity, mesh};
+    }
+    const size_t size = count * sizeof *state->found;
+    if (count == w->instance_count && (count == 0 || memcmp(state->found, state->listed, size) == 0))
+        return false;
+    memory_reserve((void **)&state->listed, &state->listed_capacity, count, sizeof *state->listed);
+    memcpy(state->listed, state->found, size);
+    w->instance_count = count;
+    return true;
+}
+
+// ---- Instances on the GPU
+
+static void rows_of(const float matrix[16], float rows[3][4])
+{
+    for (int row = 0; row < 3; row++)
+        for (int k = 0; k < 4; k++)
+            rows[row][k] = matrix[4 * k + row];
+}
+
+// The inverse transpose up to a positive factor, by cofactors. Returns whether the determinant is negative.
+static bool normal_matrix_of(const float world[3][4], float normal[3][4])
+{
+    float largest = 0;
+    for (int row = 0; row < 3; row++) {
+        glm_vec3_cross((float *)world[(row + 1) % 3], (float *)world[(row + 2) % 3], normal[row]);
+        normal[row][3] = 0;
+        largest = fmaxf(largest,
+                        glm_vec3_max((float[3]){fabsf(normal[row][0]), fabsf(normal[row][1]), fabsf(normal[row][2])}));
+    }
+    const bool mirrored = glm_vec3_dot((float *)world[0], normal[0]) < 0;
+    const float scale = (mirrored ? -1.0f : 1.0f) / (largest > 0 ? largest : 1.0f);
+    for (int row = 0; row < 3; row++)
+        glm_vec3_scale(normal[row], scale, normal[row]);
+    return mirrored;
+}
+
+static mesh_instance_gpu instance_make(const renderer *r, const world_instance *from)
+{
+    const transform_component *transform = ecs_get(r->world, from->entity, r->gpu_world->transform);
+    const scene_mesh *mesh = &r->scene->meshes[from->mesh];
+    mesh_instance_gpu instance = {
+        .first_primitive = mesh->first_primitive, .primitive_count = mesh->primitive_count, .mesh = from->mesh};
+    rows_of(transform->world, instance.world);
+    rows_of(transform->previous_world, instance.previous_world);
+    instance.mirrored = normal_matrix_of(instance.world, instance.normal_matrix);
+    return instance;
+}
+
+static void tlas_instances_write(renderer *r, VkAccelerationStructureInstanceKHR *to)
+{
+    const world_gpu *w = r->gpu_world;
+    for (uint32_t i = 0; i < w->instance_count; i++) {
+        VkAccelerationStructureInstanceKHR instance = {
+            .instanceCustomIndex = i,
+            .mask = 0xff,
+            .flags = VK_GEOMETRY_INSTANCE_TRIANGLE_FACING_CULL_DISABLE_BIT_KHR,
+            .accelerationStructureReference = gpu_acceleration_address(r->gpu, w->blas[w->order[i].mesh]),
+        };
+        memcpy(instance.transform.matrix, w->instance_data[i].world, sizeof instance.transform.matrix);
+        to[i] = instance;
+    }
+}
+
+static bool instance_moved(const mesh_instance_gpu *instance)
+{
+    return memcmp(instance->world, instance->previous_world, sizeof instance->world) != 0;
+}
+
+// Fills this frame's instances in; `emitter_moved` is set when one with an emissive material moved. False: no memory.
+static bool instances_write(renderer *r, bool *emitter_moved)
+{
+    world_gpu *w = r->gpu_world;
+    if (w->instance_count > w->instance_max)
+        w->instance_max = max_u32(w->instance_count, 2 * w->instance_max);
+    const VkDeviceSize max = w->instance_max;
+    mesh_instance_gpu *instances =
+        world_buffer_reserve(r, &w->instances, "instances", SCENE_INSTANCES, max * sizeof *instances);
+    VkAccelerationStructureInstanceKHR *tlas_instances =
+        world_buffer_reserve(r, &w->tlas_instances, "tlas instances", BINDING_NONE, max * sizeof *tlas_instances);
+    if (!instances || !tlas_instances)
+        return false;
+    memory_reserve((void **)&w->instance_data, &w->state->data_capacity, w->instance_count, sizeof *w->instance_data);
+    for (uint32_t i = 0; i < w->instance_count; i++) {
+        w->instance_data[i] = instance_make(r, &w->order[i]);
+        *emitter_moved |= w->state->mesh_emits[w->order[i].mesh] && instance_moved(&w->instance_data[i]);
+    }
+    memcpy(instances, w->instance_data, w->instance_count * sizeof *instances);
+    tlas_instances_write(r, tlas_instances);
+    return true;
+}
+
+static void bounds_extract(renderer *r)
+{
+    const world_gpu *w = r->gpu_world;
+    box b = box_empty;
+    for (uint32_t i = 0; i < w->instance_count; i++)
+        box_add_instance(r, &b, &w->order[i]);
+    if (b.min[0] > b.max[0])
+        b = (box){0};
+    frame_constants *c = &r->constants;
+    memcpy(c->scene_min, b.min, sizeof b.min);
+    memcpy(c->scene_max, b.max, sizeof b.max);
+    c->scene_radius = fmaxf(0.5f * glm_vec3_distance(b.min, b.max), FLT_MIN);
+}
+
+static void world_extract(ecs_world *world, void *user)
+{
+    (void)world;
+    renderer *r = user;
+    const bool changed = instances_find(r);
+    if (changed)
+        instances_order(r);
+    bool emitter_moved = changed;
+    r->failed |= !instances_write(r, &emitter_moved);
+    if (r->failed)
+        return;
+    bounds_extract(r);
+    r->failed |= !world_lights_extract(r, emitter_moved);
+}
+
+// ---- Life
+
+static void components_register(renderer *r)
+{
+    world_gpu *w = r->gpu_world;
+    const struct {
+        component_type *type;
+        component_desc desc;
+    } types[] = {
+        {&w->node, {.name = "node", .size = sizeof(node_component)}},
+        {&w->transform, {.name = "transform", .size = sizeof(transform_component)}},
+        {&w->mesh, {.name = "mesh", .size = sizeof(mesh_component)}},
+        {&w->light, {.name = "light", .size = sizeof(light_component)}},
+    };
+    for (size_t i = 0; i < countof(types); i++)
+        *types[i].type = ecs_component_register(r->world, &types[i].desc);
+}
+
+static void meshes_find_emitters(renderer *r)
+{
+    const scene_data *s = r->scene;
+    bool *emits = memory_alloc(max_u32(s->mesh_count, 1) * sizeof *emits);
+    for (uint32_t i = 0; i < s->mesh_count; i++)
+        for (uint32_t k = 0; k < s->meshes[i].primitive_count; k++)
+            emits[i] |= world_material_emits(r, s->primitives[s->meshes[i].first_primitive + k].material);
+    r->gpu_world->state->mesh_emits = emits;
+}
+
+bool world_init(renderer *r)
+{
+    world_gpu *w = r->gpu_world = memory_alloc(sizeof *w);
+    w->state = memory_alloc(sizeof *w->state);
+    components_register(r);
+    meshes_find_emitters(r);
+    scene_spawn(r);
+    const ecs_system_desc transforms = {
+        .name = "transforms", .phase = ECS_PHASE_UPDATE, .run = transforms_update, .user = r};
+    ecs_system_register(r->world, &transforms);
+    const ecs_system_desc extract = {.name = "extract", .phase = ECS_PHASE_EXTRACT, .run = world_extract, .user = r};
+    ecs_system_register(r->world, &extract);
+    return world_upload(r) && world_lights_init(r) &&
+           world_buffer_reserve(r, &w->frame, "frame constants", SCENE_FRAME, sizeof(frame_constants));
+}
+
+void world_fini(renderer *r)
+{
+    world_gpu *w = r->gpu_world;
+    if (!w)
+        return;
+    world_lights_fini(r);
+    const gpu_buffer buffers[] = {w->frame,      w->positions, w->attributes,    w->indices,
+                                  w->primitives, w->instances, w->materials,     w->lights,
+                                  w->emitters,   w->light_cdf, w->tlas_instances};
+    for (size_t i = 0; i < countof(buffers); i++)
+        gpu_buffer_destroy(r->gpu, buffers[i]);
+    for (uint32_t i = 0; i < w->blas_count; i++)
+        gpu_acceleration_destroy(r->gpu, w->blas[i]);
+    for (uint32_t i = 0; i < w->texture_count; i++)
+        gpu_image_destroy(r->gpu, w->textures[i]);
+    free(w->blas);
+    free(w->textures);
+    free(w->primitive_boxes);
+    free(w->order);
+    free(w->instance_data);
+    free(w->state->listed);
+    free(w->state->found);
+    free(w->state->mesh_emits);
+    free(w->state);
+    free(w);
+}

@@ -1,0 +1,179 @@
+// Sampled direct light: a pair of estimates, unshadowed and shadowed, that differ only by the visibility of the same
+// samples. Many punctual lights are sampled by streaming over all of them, emissive triangles by resampled importance
+// sampling (Talbot et al. 2005). The including shader defines ANALYTIC: 1 also writes the unshadowed light exactly.
+#define TLAS_BINDING 2
+#define RAYS_BINDING 3
+#include "direct_light.glsl.h"
+#include "ray.glsl.h"
+#include "ray_count.glsl.h"
+
+layout(local_size_x = 8, local_size_y = 8) in;
+layout(set = 0, binding = 0) uniform sampler2D depth_map;
+layout(set = 0, binding = 1) uniform sampler2D normal_map;
+layout(set = 0, binding = 4, rgba32f) uniform writeonly image2D direct_u;
+layout(set = 0, binding = 5, rgba32f) uniform writeonly image2D direct_s;
+#if ANALYTIC
+layout(set = 0, binding = 6, rgba32f) uniform writeonly image2D direct_analytic;
+#endif
+layout(push_constant, scalar) uniform push_block {
+    uint samples;    // of each kind, 1 to SAMPLES_MAX
+    uint candidates; // of each sample of the emissive triangles
+    uint punctual;   // 1: the punctual lights are sampled here
+} push;
+
+const uint SAMPLES_MAX = 8u;
+
+struct direct_estimate {
+    vec3 unshadowed, shadowed;
+    vec3 exact; // unshadowed, without noise
+    uint rays;
+};
+
+void estimate_add(inout direct_estimate estimate, vec3 light, vec3 origin, vec3 direction, float distance)
+{
+    light /= float(push.samples);
+    estimate.unshadowed += light;
+    estimate.rays++;
+    if (ray_visible(origin, direction, distance))
+        estimate.shadowed += light;
+}
+
+// Reservoirs of size one: a light replaces the kept one with its share of the weights so far. The random numbers are
+// keyed by light and sample, not drawn in turn.
+void sample_punctual(gbuffer_point point, vec3 origin, uint key, inout direct_estimate estimate)
+{
+    uint chosen[SAMPLES_MAX];
+    float total = 0.0;
+    for (uint i = 0u; i < frame.light_count; i++) {
+        vec3 light = punctual_arrival(lights[i], point).light;
+        float weight = luminance(light);
+        if (weight <= 0.0)
+            continue;
+        estimate.exact += light;
+        total += weight;
+        uint light_key = hash(key, i);
+        for (uint s = 0u; s < push.samples; s++)
+            if (total == weight || unit_float(hash(light_key, s)) * total < weight)
+                chosen[s] = i;
+    }
+    if (total <= 0.0)
+        return;
+    for (uint s = 0u; s < push.samples; s++) {
+        light_arrival a = punctual_arrival(lights[chosen[s]], point);
+        estimate_add(estimate, a.light * (total / luminance(a.light)), origin, a.direction, 0.9999 * a.distance);
+    }
+}
+
+// The emissive triangles' part of the light sources' distribution; the punctual lights come first in it.
+float emitter_share() { return 1.0 - (frame.light_count > 0u ? light_cdf[frame.light_count - 1u] : 0.0); }
+
+// Chooses an emissive triangle by u in [0,1): by power, or uniformly where so little of the distribution is theirs (beside
+// a sun) that its floats no longer tell them apart. Writes the probability of the choice.
+uint emitter_at(float u, float share, out float probability)
+{
+    if (share < 0.01) {
+        probability = 1.0 / float(frame.emitter_count);
+        return min(uint(u * float(frame.emitter_count)), frame.emitter_count - 1u);
+    }
+    float target = 1.0 - share + u * share;
+    uint low = 0u, high = frame.emitter_count - 1u;
+    while (low < high) {
+        uint middle = (low + high) / 2u;
+        if (light_cdf[frame.light_count + middle] > target)
+            high = middle;
+        else
+            low = middle + 1u;
+    }
+    probability = max(emitters[low].probability / share, 1e-30);
+    return low;
+}
+
+// Uniform on the triangle.
+vec2 triangle_point(vec2 u)
+{
+    float root = sqrt(u.x);
+    return vec2(root * (1.0 - u.y), root * u.y);
+}
+
+struct emitter_choice {
+    uint triangle;
+    vec2 barycentrics;
+    vec3 light;   // the estimate of all the emitters' unshadowed light that it stands for
+};
+
+// One point out of push.candidates, in proportion to the luminance it sends. The triangles are chosen by power,
+// stratified; their points lie on an R2 sequence (Roberts 2018) with a random shift.
+emitter_choice emitter_choose(gbuffer_point point, uint key, float share)
+{
+    const vec2 r2 = vec2(0.7548776662, 0.5698402910);
+    vec2 shift = vec2(unit_float(hash(key, 1u)), unit_float(hash(key, 2u)));
+    emitter_choice choice = emitter_choice(0u, vec2(0.0), vec3(0.0));
+    float total = 0.0, chosen_weight = 1.0;
+    for (uint i = 0u; i < push.candidates; i++) {
+        uint candidate_key = hash(key, 3u + i);
+        float probability;
+        uint triangle =
+            emitter_at((float(i) + unit_float(candidate_key)) / float(push.candidates), share, probability);
+        vec2 barycentrics = triangle_point(fract(shift + float(i) * r2));
+        emissive_triangle e = emitters[triangle];
+        vec3 light = emitter_light(e, barycentrics, point) * (e.area / probability);
+        float weight = luminance(light);
+        total += weight;
+        if (weight > 0.0 && unit_float(hash(candidate_key)) * total < weight) {
+            choice = emitter_choice(triangle, barycentrics, light);
+            chosen_weight = weight;
+        }
+    }
+    choice.light *= total / (chosen_weight * float(push.candidates));
+    return choice;
+}
+
+void sample_emitters(gbuffer_point point, vec3 origin, uint key, inout direct_estimate estimate)
+{
+    float share = emitter_share();
+    for (uint s = 0u; s < push.samples; s++) {
+        emitter_choice choice = emitter_choose(point, hash(key, s), share);
+        if (choice.light == vec3(0.0))
+            continue;
+        emissive_triangle e = emitters[choice.triangle];
+        vec3 end = e.corner + choice.barycentrics.x * e.edge1 + choice.barycentrics.y * e.edge2;
+        // Off the emitter's plane on the lit side, so that the ray cannot hit the emitter itself.
+        vec3 side = dot(e.normal, point.position - e.corner) > 0.0 ? e.normal : -e.normal;
+        vec3 path = offset_origin(end, side, frame.scene_radius) - origin;
+        float distance = max(length(path), 1e-12);
+        estimate_add(estimate, choice.light, origin, path / distance, distance);
+    }
+}
+
+direct_estimate shade(uvec2 pixel, gbuffer_point point)
+{
+    direct_estimate estimate = direct_estimate(vec3(0.0), vec3(0.0), vec3(0.0), 0u);
+    vec3 origin = offset_origin(point.position, point.geometric, frame.scene_radius);
+    uint key = hash(pixel.x | pixel.y << 16, frame.frame, frame.seed);
+    if (push.punctual != 0u)
+        sample_punctual(point, origin, hash(key, 1u), estimate);
+    if (frame.emitter_count > 0u)
+        sample_emitters(point, origin, hash(key, 2u), estimate);
+#if ANALYTIC
+    for (uint i = 0u; i < frame.emitter_count; i++)
+        estimate.exact += emitter_light_exact(emitters[i], point);
+#endif
+    return estimate;
+}
+
+void main()
+{
+    uvec2 pixel = gl_GlobalInvocationID.xy;
+    direct_estimate estimate = direct_estimate(vec3(0.0), vec3(0.0), vec3(0.0), 0u);
+    if (all(lessThan(pixel, uvec2(frame.width, frame.height)))) {
+        gbuffer_point point;
+        if (gbuffer_read(depth_map, normal_map, pixel, point))
+            estimate = shade(pixel, point);
+        imageStore(direct_u, ivec2(pixel), vec4(estimate.unshadowed, 0.0));
+        imageStore(direct_s, ivec2(pixel), vec4(estimate.shadowed, 0.0));
+#if ANALYTIC
+        imageStore(direct_analytic, ivec2(pixel), vec4(estimate.exact, 0.0));
+#endif
+    }
+    ray_count(estimate.rays);
+}

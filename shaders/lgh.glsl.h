@@ -1,0 +1,76 @@
+// The lighting grid hierarchy's geometry: grids, vertex masks and ranks, and the order of the merged grid lights.
+//
+// Exponent c has 2^c cells along each axis and 2^c + 1 vertices. Which vertices hold light is a bit mask per exponent
+// (`lgh_masks`), stored in blocks of 8^3 vertices, Morton order inside a block, blocks in raster order, exponents 0, 1, ...
+// one after the other. `lgh_ranks` counts the bits before each word over the whole array, so a vertex's rank is at once
+// its place in the merged arrays (`lgh_vertices`, `lgh_sums`, `lgh_lights`): the top level first, S1 last.
+#ifndef LGH_GLSL_H
+#define LGH_GLSL_H
+
+#include "common.glsl.h"
+
+// In `lgh_samples`, the VPLs at which shadow rays to a grid light may end: there is none, as the light has no intensity.
+const uint LGH_NO_SAMPLE = 0xffffffffu;
+
+// Words before exponent c's masks, and after the last: 16 ceil((2^c + 1) / 8)^3 words each.
+const uint LGH_MASK_OFFSET[LGH_EXPONENTS + 1] =
+    uint[](0u, 16u, 32u, 48u, 176u, 608u, 2608u, 14272u, 92880u, 667872u, 5061872u);
+
+// The bits of x (at most 9) spread to every third.
+uint spread_bits(uint x)
+{
+    x = (x | x << 16) & 0x030000ffu;
+    x = (x | x << 8) & 0x0300f00fu;
+    x = (x | x << 4) & 0x030c30c3u;
+    return (x | x << 2) & 0x09249249u;
+}
+uint morton(uvec3 v) { return spread_bits(v.x) | spread_bits(v.y) << 1 | spread_bits(v.z) << 2; }
+
+uint compact_bits(uint x)
+{
+    x &= 0x09249249u;
+    x = (x | x >> 2) & 0x030c30c3u;
+    x = (x | x >> 4) & 0x0300f00fu;
+    x = (x | x >> 8) & 0x030000ffu;
+    return (x | x >> 16) & 0x3ffu;
+}
+uvec3 morton_decode(uint code) { return uvec3(compact_bits(code), compact_bits(code >> 1), compact_bits(code >> 2)); }
+
+uint pack_vertex(uvec3 v) { return v.x | v.y << 10 | v.z << 20; }
+uvec3 unpack_vertex(uint packed) { return uvec3(packed, packed >> 10, packed >> 20) & 0x3ffu; }
+
+uint mask_blocks(uint c) { return ((1u << c) >> 3) + 1u; } // along an axis
+
+// Bit number of a vertex in the mask array.
+uint mask_bit(uint c, uvec3 v)
+{
+    uint blocks = mask_blocks(c);
+    uvec3 block = v >> 3;
+    return (LGH_MASK_OFFSET[c] << 5) + (((block.z * blocks + block.y) * blocks + block.x) << 9) + morton(v & 7u);
+}
+
+// The vertex of a bit number within exponent c.
+uvec3 mask_vertex(uint c, uint bit)
+{
+    bit -= LGH_MASK_OFFSET[c] << 5;
+    uint blocks = mask_blocks(c);
+    uint block = bit >> 9;
+    return uvec3(block % blocks, block / blocks % blocks, block / (blocks * blocks)) * 8u + morton_decode(bit & 511u);
+}
+
+// Position on the grid of exponent c, in cells: in [0, 2^c). Powers of two scale exactly, so the cells of all exponents nest.
+vec3 grid_position(vec3 position, vec3 origin, float top_size, uint c)
+{
+    return clamp((position - origin) / top_size, vec3(0.0), vec3(0.99999994)) * float(1u << c);
+}
+
+// Exponent of a merged index: levels[c].first_light grows with c.
+uint light_exponent(lgh_header header, uint light)
+{
+    uint c = header.level_count - 1u;
+    while (c > 0u && light < header.levels[c].first_light)
+        c--;
+    return c;
+}
+
+#endif

@@ -1,0 +1,49 @@
+// Marks the vertices around each VPL's cell on every candidate grid, and counts the marks: integers, so the order of the
+// atomics leaves no trace. A VPL whose neighbour in the list shares its cell leaves the marking to it.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#include "lgh.glsl.h"
+
+layout(local_size_x = 64) in;
+layout(set = 0, binding = 0, scalar) readonly buffer keys_block { uint keys[]; };
+layout(set = 0, binding = 1, scalar) buffer masks_block { uint masks[]; };
+layout(set = 0, binding = 2, scalar) buffer counts_block { uint counts[LGH_EXPONENTS]; };
+layout(push_constant, scalar) uniform push_block { uint slot_count, exponent; } push;
+
+shared uint group_counts[LGH_EXPONENTS];
+
+void mark_cell(uint c, uvec3 cell)
+{
+    uint marked = 0u;
+    for (uint corner = 0u; corner < 8u; corner++) {
+        uint bit = mask_bit(c, cell + (uvec3(corner, corner >> 1, corner >> 2) & 1u));
+        uint flag = 1u << (bit & 31u);
+        if ((masks[bit >> 5] & flag) == 0u && (atomicOr(masks[bit >> 5], flag) & flag) == 0u)
+            marked++;
+    }
+    if (marked > 0u)
+        atomicAdd(group_counts[c], marked);
+}
+
+void main()
+{
+    uint thread = gl_LocalInvocationIndex;
+    if (thread < LGH_EXPONENTS)
+        group_counts[thread] = 0u;
+    barrier();
+    uint i = gl_GlobalInvocationID.x;
+    uint empty = 1u << 3u * push.exponent;
+    if (i < push.slot_count && keys[i] < empty) {
+        uint key = keys[i];
+        uint neighbour = i > 0u ? keys[i - 1u] : empty;
+        for (uint c = push.exponent + 1u; c-- > 0u;) {
+            uint shift = 3u * (push.exponent - c);
+            if (neighbour >> shift == key >> shift)
+                break; // and so on all coarser grids
+            mark_cell(c, morton_decode(key >> shift));
+        }
+    }
+    barrier();
+    if (thread < LGH_EXPONENTS && group_counts[thread] > 0u)
+        atomicAdd(counts[thread], group_counts[thread]);
+}

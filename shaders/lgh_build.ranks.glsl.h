@@ -1,0 +1,33 @@
+// Ranks of a bit mask: what the steps before and after the scan of the workgroups' sums share.
+#ifndef LGH_BUILD_RANKS_GLSL_H
+#define LGH_BUILD_RANKS_GLSL_H
+
+#include "lgh.glsl.h"
+
+layout(local_size_x = 256) in;
+layout(set = 0, binding = 0, scalar) readonly buffer masks_block { uint masks[]; };
+layout(set = 0, binding = 1, scalar) readonly buffer header_block { lgh_header header; };
+layout(set = 0, binding = 2, scalar) buffer ranks_block { uint ranks[]; };
+layout(set = 0, binding = 3, scalar) buffer group_sums_block { uint group_sums[]; };
+layout(push_constant, scalar) uniform push_block { uint cells; } push; // 1: the mask of S1's cells, else of the vertices
+
+const uint RUN = LGH_SCAN_WORDS / 256u;
+
+uint word_count()
+{
+    if (push.cells == 0u)
+        return header.word_count;
+    return header.level_count == 0u ? 0u : ((1u << 3u * (header.level_count - 1u)) + 31u) / 32u;
+}
+
+uint run_first() { return gl_WorkGroupID.x * LGH_SCAN_WORDS + gl_LocalInvocationIndex * RUN; }
+
+uint run_sum()
+{
+    uint sum = 0u;
+    for (uint i = run_first(); i < min(run_first() + RUN, word_count()); i++)
+        sum += uint(bitCount(masks[i]));
+    return sum;
+}
+
+#endif

@@ -1,0 +1,60 @@
+// What a grid light or a VPL sends to a shaded point: blending functions, emission models, one formula for both. Used by
+// the light volumes, the shadow rays and the brute-force tests alike, so that they agree by construction.
+#ifndef LGH_SHADE_GLSL_H
+#define LGH_SHADE_GLSL_H
+
+#include "lgh.glsl.h"
+
+const uint BLEND_LOWEST = 0u; // the lowest level in use
+const uint BLEND_MIDDLE = 1u;
+const uint BLEND_TOP = 2u;
+const uint BLEND_ONLY = 3u;   // one level alone
+
+// The share of a level at distance d, r = alpha * h (Lin and Yuksel 2019, Figure 2; Yuksel and Yuksel 2017). For one d
+// over all levels these sum to 1.
+float lgh_blend(uint kind, float d, float r)
+{
+    float rise = clamp(2.0 * d / r - 1.0, 0.0, 1.0);
+    float fall = clamp(2.0 - d / r, 0.0, 1.0);
+    return kind == BLEND_LOWEST ? fall : kind == BLEND_MIDDLE ? min(rise, fall) : kind == BLEND_TOP ? rise : 1.0;
+}
+
+// Kind of exponent c's level. `lowest` is the exponent of the lowest level in use: level_count - 1 for S1, or
+// level_count for the VPLs themselves (start level 0).
+uint blend_kind(uint c, uint lowest) { return lowest == 0u ? BLEND_ONLY : c == lowest ? BLEND_LOWEST : c == 0u ? BLEND_TOP : BLEND_MIDDLE; }
+
+// What a grid light's VPLs send towards the unit direction v, relative to their intensity: an estimate of the mean over
+// their normals n of max(0, n.v), from the mean normal m and the second moment M.
+float grid_emission(uint model, grid_light light, vec3 v)
+{
+    float mean = dot(light.normal, v);
+    float square = max(0.0, dot(light.moment_diagonal, v * v) + 2.0 * dot(light.moment_mixed, v.xxy * v.yzz)); // v' M v
+    if (model <= EMISSION_MEAN_NORMAL)
+        return max(0.0, mean);
+    // A: the clamped cosine's expansion to second order in spherical harmonics, averaged (Ramamoorthi and Hanrahan 2001).
+    float a = max(0.0, 0.25 + 0.5 * mean + 5.0 / 32.0 * (3.0 * square - 1.0));
+    // B: max(0, x) = (x + |x|) / 2 with E|x| <= sqrt(E x^2).
+    float b = max(0.0, 0.5 * (mean + sqrt(square)));
+    return model == EMISSION_A ? a : model == EMISSION_B ? b : 0.5 * (a + b);
+}
+
+// Radiance over albedo that a unit of light from `position` gives a surface point before the emission factor:
+// cos / (pi (d^2 + b^2)); zero from behind either normal. `to_point` becomes the unit direction from light to point.
+float receive(vec3 position, vec3 point, vec3 geometric, vec3 shading, float singularity, out vec3 to_point)
+{
+    vec3 offset = point - position;
+    float square = dot(offset, offset);
+    to_point = offset * inversesqrt(max(square, 1e-20));
+    if (dot(geometric, to_point) >= 0.0)
+        return 0.0;
+    return max(0.0, -dot(shading, to_point)) / (PI * (square + singularity * singularity + 1e-20));
+}
+
+vec3 vpl_light(vpl light, vec3 point, vec3 geometric, vec3 shading, float singularity)
+{
+    vec3 v;
+    float received = receive(light.position, point, geometric, shading, singularity, v);
+    return light.color * (received * max(0.0, dot(light.normal, v)));
+}
+
+#endif

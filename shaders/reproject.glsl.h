@@ -1,0 +1,62 @@
+// Finding a pixel's surface in the last frame: four bilinear taps, each refused where it shows another surface.
+#ifndef REPROJECT_GLSL_H
+#define REPROJECT_GLSL_H
+
+#include "filter_geometry.glsl.h"
+
+struct reprojection {
+    ivec2 corner; // taps: corner + (0,0), (1,0), (0,1), (1,1)
+    vec4 weights; // of the taps; sum 1
+};
+
+ivec2 reprojection_tap(reprojection r, int i) { return r.corner + ivec2(i & 1, i >> 1); }
+
+vec3 previous_position(ivec2 pixel, float depth)
+{
+    vec2 ndc = (vec2(pixel) + 0.5) / vec2(frame.width, frame.height) * 2.0 - 1.0;
+    vec3 ray = frame.previous_forward + ndc.x * frame.previous_right - ndc.y * frame.previous_up;
+    return frame.previous_eye + frame.near_plane / depth * ray;
+}
+
+// Pixels that the surface itself moved, beyond what the camera's motion explains.
+float object_motion(uvec2 pixel, vec3 position, vec2 motion)
+{
+    vec4 clip = frame.previous_view_projection * vec4(position, 1.0);
+    if (clip.w <= 0.0)
+        return 0.0;
+    vec2 previous = (clip.xy / clip.w * 0.5 + 0.5) * vec2(frame.width, frame.height);
+    return length(previous - (vec2(pixel) + 0.5 + motion));
+}
+
+// `motion` leads from this pixel to its place in the last frame. False where the last frame did not show the surface.
+bool reproject(uvec2 pixel, gbuffer_point point, vec2 motion, sampler2D previous_depth, sampler2D previous_normals,
+               out reprojection r)
+{
+    vec2 place = vec2(pixel) + motion;
+    r.corner = ivec2(floor(place));
+    vec2 f = place - vec2(r.corner);
+    r.weights = vec4((1.0 - f.x) * (1.0 - f.y), f.x * (1.0 - f.y), (1.0 - f.x) * f.y, f.x * f.y);
+    // An object that moved sideways by some pixels may have moved as far along its normal.
+    float moved = object_motion(pixel, point.position, motion);
+    float tolerance = pixel_footprint(point.view_z) * (2.0 + (moved > 0.1 ? 2.0 * moved : 0.0));
+    for (int i = 0; i < 4; i++) {
+        ivec2 tap = reprojection_tap(r, i);
+        if (r.weights[i] == 0.0 || any(greaterThanEqual(uvec2(tap), uvec2(frame.width, frame.height)))) {
+            r.weights[i] = 0.0;
+            continue;
+        }
+        float depth = texelFetch(previous_depth, tap, 0).x;
+        vec3 normal = octahedral_decode(texelFetch(previous_normals, tap, 0).xy);
+        if (depth <= 0.0 || dot(normal, point.geometric) < 0.9 ||
+            abs(dot(point.geometric, previous_position(tap, depth) - point.position)) > tolerance)
+            r.weights[i] = 0.0;
+    }
+    float total = dot(r.weights, vec4(1.0));
+    // Below a hundredth the history would be one badly placed texel.
+    if (total < 0.01)
+        return false;
+    r.weights /= total;
+    return true;
+}
+
+#endif

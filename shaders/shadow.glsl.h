@@ -1,0 +1,125 @@
+// Traces the shadow samples: for each pixel and reservoir a ray towards a point of the chosen light. U is the unshadowed
+// estimate from the samples, S the same times visibility, so S / U is the shadow ratio (Heitz et al. 2018; Lin and Yuksel
+// 2019, section 3.3).
+#ifndef SHADOW_GLSL_H
+#define SHADOW_GLSL_H
+
+#define TLAS_BINDING 0
+#include "ray.glsl.h"
+#define RAYS_BINDING 1
+#include "ray_count.glsl.h"
+#include "gbuffer.glsl.h"
+#include "interleave.glsl.h"
+#include "lgh_shade.glsl.h"
+#include "reservoir.glsl.h"
+
+layout(local_size_x = 8, local_size_y = 8) in;
+layout(set = 0, binding = 2, scalar) readonly buffer header_block { lgh_header header; };
+layout(set = 0, binding = 3, scalar) readonly buffer grid_lights_block { grid_light grid_lights[]; };
+layout(set = 0, binding = 4, scalar) readonly buffer vpls_block { vpl vpls[]; };
+layout(set = 0, binding = 5) uniform sampler2D depth_map;
+layout(set = 0, binding = 6) uniform sampler2D normal_map;
+layout(set = 0, binding = 7) uniform sampler2D indirect_map;
+layout(set = 0, binding = 8, scalar) readonly buffer keys_block { uint64_t reservoir_keys[]; };
+layout(set = 0, binding = 8, scalar) readonly buffer words_block { uint reservoir_words[]; };
+layout(set = 0, binding = 9, rgba32f) writeonly uniform image2D shadow_u;
+layout(set = 0, binding = 10, rgba32f) writeonly uniform image2D shadow_s;
+#ifdef END_POINT_VPL
+layout(set = 0, binding = 11, scalar) readonly buffer samples_block { uvec4 samples[]; };
+#endif
+layout(push_constant, scalar) uniform push_block {
+    uint interleave, emission, start_level, samples;
+    float singularity; // b, metres
+} push;
+
+layout(constant_id = 0) const bool EXACT = true;
+layout(constant_id = 1) const bool UNIFORM = false;
+layout(constant_id = 2) const bool JITTER = false; // end points of shadow.comp.glsl: jittered, else centres
+
+#include "shadow_end_point.glsl.h"
+
+uint reservoir_light(uint pixel, uint s)
+{
+    return EXACT ? uint(reservoir_keys[pixel * push.samples + s]) : reservoir_words[pixel * (push.samples + 1u) + 1u + s];
+}
+
+// The light of a sample as the light volumes saw it: what it sends to the point, blended and dealt, and what its end
+// point would have sent in its place.
+struct shadow_sample {
+    vec3 centre_light; // decides the weight f
+    vec3 end_light;    // what U uses
+    vec3 end;
+};
+
+float dealt_factor(uint count)
+{
+    uint tiles = push.interleave * push.interleave;
+    return count >= 4u * tiles ? float(tiles) : 1.0;
+}
+
+shadow_sample vpl_sample(uint slot, gbuffer_point p)
+{
+    vpl light = vpls[slot];
+    float r = 0.5 * header.levels[header.level_count - 1u].radius;
+    float scale = lgh_blend(BLEND_LOWEST, distance(light.position, p.position), r) * float(push.interleave * push.interleave);
+    vec3 sent = scale * vpl_light(light, p.position, p.geometric, p.shading, push.singularity);
+    return shadow_sample(sent, sent, light.position);
+}
+
+shadow_sample grid_sample(uint index, gbuffer_point p, uint random)
+{
+    grid_light light = grid_lights[index];
+    uint c = light_exponent(header, index);
+    uint lowest = push.start_level == 0u ? header.level_count : header.level_count - 1u;
+    float scale = lgh_blend(blend_kind(c, lowest), distance(light.position, p.position), header.levels[c].radius);
+    scale *= dealt_factor(header.levels[c].occupied);
+    vec3 v;
+    float received = receive(light.position, p.position, p.geometric, p.shading, push.singularity, v);
+    shadow_sample s;
+    s.centre_light = light.color * (scale * received * grid_emission(push.emission, light, v));
+    s.end_light = scale * end_point_light(light, index, s.centre_light / max(scale, 1e-30), p, random, s.end);
+    return s;
+}
+
+// Adds one sample to U and S; returns the number of rays.
+uint shade_sample(uint light, float f_sum, gbuffer_point p, uint random, inout vec3 u, inout vec3 s)
+{
+    shadow_sample chosen = (light & RESERVOIR_VPL) != 0u ? vpl_sample(light & ~RESERVOIR_VPL, p) : grid_sample(light, p, random);
+    float f = UNIFORM ? 1.0 : luminance(chosen.centre_light);
+    vec3 estimate = f > 0.0 ? chosen.end_light * (f_sum / (f * float(push.samples))) : vec3(0.0);
+    if (luminance(estimate) <= 0.0)
+        return 0u;
+    u += estimate;
+    vec3 origin = offset_origin(p.position, p.geometric, frame.scene_radius);
+    vec3 offset = chosen.end - origin;
+    float reach = length(offset);
+    if (ray_visible(origin, offset / max(reach, 1e-20), reach * 0.9999))
+        s += estimate;
+    return 1u;
+}
+
+void main()
+{
+    uvec2 pixel = gl_GlobalInvocationID.xy, size = uvec2(frame.width, frame.height);
+    vec3 u = vec3(0.0), s = vec3(0.0);
+    uint rays = 0u;
+    gbuffer_point point;
+    bool inside = all(lessThan(pixel, size));
+    if (inside && gbuffer_read(depth_map, normal_map, pixel, point)) {
+        float f_sum = texelFetch(indirect_map, ivec2(interleave_texel(pixel, push.interleave, size)), 0).a;
+        uint index = pixel.y * size.x + pixel.x;
+        for (uint i = 0u; f_sum > 0.0 && i < push.samples; i++) {
+            uint light = reservoir_light(index, i);
+            uint random = hash(hash(index, frame.frame, frame.seed), 0x51ed270bu, i);
+            if (light != RESERVOIR_EMPTY)
+                rays += shade_sample(light, f_sum, point, random, u, s);
+        }
+    }
+    if (inside) {
+        imageStore(shadow_u, ivec2(pixel), vec4(u, 0.0));
+        imageStore(shadow_s, ivec2(pixel), vec4(s, 0.0));
+    }
+    ray_count(rays);
+}
+
+#endif

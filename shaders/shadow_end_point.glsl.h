@@ -1,0 +1,42 @@
+// Where a shadow ray ends: the light's centre, a point jittered by its deviation, or one of the VPLs that it stands for.
+// The includer declares the hierarchy's buffers.
+#ifndef SHADOW_END_POINT_GLSL_H
+#define SHADOW_END_POINT_GLSL_H
+
+// A box with the lights' variance: of the symmetric kernels the one with the smallest support, so the fewest points land
+// behind walls.
+vec3 jittered(grid_light light, uint random)
+{
+    vec3 x = vec3(unit_float(hash(random, 1u)), unit_float(hash(random, 2u)), unit_float(hash(random, 3u)));
+    return light.position + light.deviation * (sqrt(3.0) * (2.0 * x - 1.0));
+}
+
+#ifdef END_POINT_VPL
+
+// What the light's end point sends in the whole light's place, without blending; `end` becomes the end point.
+vec3 end_point_light(grid_light light, uint index, vec3 centre_light, gbuffer_point p, uint random, out vec3 end)
+{
+    end = light.position;
+    uint slot = samples[index][random & 3u];
+    if (slot == LGH_NO_SAMPLE)
+        return centre_light;
+    end = vpls[slot].position;
+    vec3 sent = vpl_light(vpls[slot], p.position, p.geometric, p.shading, push.singularity);
+    return sent * (light.intensity / vpls[slot].intensity);
+}
+
+#else
+
+vec3 end_point_light(grid_light light, uint index, vec3 centre_light, gbuffer_point p, uint random, out vec3 end)
+{
+    end = light.position;
+    if (!JITTER)
+        return centre_light;
+    end = jittered(light, random);
+    vec3 v;
+    float received = receive(end, p.position, p.geometric, p.shading, push.singularity, v);
+    return light.color * (received * grid_emission(push.emission, light, v));
+}
+
+#endif
+#endif

@@ -1,0 +1,214 @@
+// What the CPU and the shaders share: structs in scalar layout, constants and enums. Included by C and by GLSL
+// (with GL_EXT_scalar_block_layout), so each exists once.
+#ifndef LANTERNFIELD_SHARED_H
+#define LANTERNFIELD_SHARED_H
+
+#ifdef VULKAN // defined by glslang
+#define SHARED_VEC2(name) vec2 name
+#define SHARED_VEC3(name) vec3 name
+#define SHARED_VEC4(name) vec4 name
+#define SHARED_MAT4(name) mat4 name
+#define SHARED_STRUCT(name) struct name
+#define SHARED_END(name, size) ;
+#else
+#include <stdint.h>
+typedef uint32_t uint;
+#define SHARED_VEC2(name) float name[2]
+#define SHARED_VEC3(name) float name[3]
+#define SHARED_VEC4(name) float name[4]
+#define SHARED_MAT4(name) float name[16] // column-major
+#define SHARED_STRUCT(name) typedef struct name name; struct name
+#define SHARED_END(name, size) ; _Static_assert(sizeof(name) == (size), "scalar layout");
+#ifdef __cplusplus
+#undef SHARED_END
+#define SHARED_END(name, size) ; static_assert(sizeof(name) == (size), "scalar layout");
+#endif
+#endif
+
+// ---- The scene (set 1)
+
+#define SCENE_FRAME 0      // frame_constants
+#define SCENE_POSITIONS 1  // vec3 per vertex, mesh space
+#define SCENE_ATTRIBUTES 2 // vertex_attributes per vertex
+#define SCENE_INDICES 3    // uint, relative to the primitive's first vertex
+#define SCENE_PRIMITIVES 4
+#define SCENE_INSTANCES 5
+#define SCENE_MATERIALS 6
+#define SCENE_LIGHTS 7     // punctual_light
+#define SCENE_EMITTERS 8   // emissive_triangle
+#define SCENE_LIGHT_CDF 9  // float per light source: inclusive sums of the choice probabilities, last is 1
+#define SCENE_TEXTURES 12
+
+SHARED_STRUCT(frame_constants) {
+    SHARED_MAT4(view_projection);          // reversed infinite depth: near/distance, 1 at the near plane, 0 at infinity
+    SHARED_MAT4(previous_view_projection); // last frame's
+    SHARED_VEC3(eye);                      // world
+    float near_plane;                      // metres
+    SHARED_VEC3(forward);                  // unit; world position = eye + view_z * (forward + x * right + y * up),
+    float scene_radius;                    //   view_z = near_plane / depth, x and y in [-1,1], y up
+    SHARED_VEC3(right);                    // scaled by tan(fov_x / 2)
+    uint frame;                            // counts from 0; keys random numbers
+    SHARED_VEC3(up);                       // scaled by tan(fov_y / 2)
+    uint seed;
+    SHARED_VEC3(scene_min);                // bounds of all instances, world
+    uint width;
+    SHARED_VEC3(scene_max);
+    uint height;
+    SHARED_VEC3(previous_eye);
+    uint light_count;                      // punctual
+    SHARED_VEC3(previous_forward);         // unit, as `forward`: rebuilds last frame's positions
+    uint emitter_count;                    // emissive triangles
+    SHARED_VEC3(previous_right);
+    float exposure_ev;                     // when not automatic
+    SHARED_VEC3(previous_up);
+    uint auto_exposure;                    // 1: EV puts the log-average at 0.18
+} SHARED_END(frame_constants, 128 + 10 * 16)
+
+SHARED_STRUCT(vertex_attributes) {
+    SHARED_VEC3(normal);
+    SHARED_VEC4(tangent); // w: sign of the bitangent; 0: no tangent
+    SHARED_VEC2(uv0);
+    SHARED_VEC2(uv1);
+    uint color_rg, color_ba; // linear, unorm16 pairs, multiplies the base colour
+} SHARED_END(vertex_attributes, 52)
+
+SHARED_STRUCT(mesh_primitive) { // a range of triangles with one material; the geometries of a mesh's BLAS are its primitives in order
+    uint first_index, index_count;
+    uint first_vertex, vertex_count;
+    uint material;
+} SHARED_END(mesh_primitive, 20)
+
+SHARED_STRUCT(mesh_instance_gpu) {
+    SHARED_VEC4(world[3]);          // rows of the 3x4 matrix from mesh to world
+    SHARED_VEC4(previous_world[3]);
+    SHARED_VEC4(normal_matrix[3]);  // rows of the inverse transpose up to a positive factor; w unused
+    uint first_primitive, primitive_count;
+    uint mirrored;                  // 1: the determinant is negative
+    uint mesh;
+} SHARED_END(mesh_instance_gpu, 160)
+
+#define TEXTURE_NONE 0xffffffffu
+SHARED_STRUCT(texture_reference) {
+    uint texture; // index into the bindless array, or TEXTURE_NONE
+    uint uv_set;  // 0 or 1
+    SHARED_VEC4(transform); // columns of KHR_texture_transform's 2x2 part: uv' = mat2(transform.xy, transform.zw) * uv + offset
+    SHARED_VEC2(offset);
+} SHARED_END(texture_reference, 32)
+
+#define MATERIAL_ALPHA_MASK 1u
+#define MATERIAL_DOUBLE_SIDED 2u
+SHARED_STRUCT(material) {
+    SHARED_VEC4(base_color); // linear
+    SHARED_VEC3(emissive);   // nits: factor times KHR_materials_emissive_strength
+    float alpha_cutoff;
+    uint flags;
+    float normal_scale;
+    float metallic, roughness; // read and kept; diffuse reflection does not use them yet
+    texture_reference base_texture, emissive_texture, normal_texture, metallic_roughness_texture;
+} SHARED_END(material, 176)
+
+#define LIGHT_POINT 0u
+#define LIGHT_SPOT 1u
+#define LIGHT_DIRECTIONAL 2u
+SHARED_STRUCT(punctual_light) {
+    SHARED_VEC3(position); // point and spot
+    uint type;
+    SHARED_VEC3(color);     // candela per channel; directional: lux
+    float spot_scale;       // KHR_lights_punctual: clamp(cos * spot_scale + spot_offset, 0, 1)^2
+    SHARED_VEC3(direction); // unit, the direction in which the light travels
+    float spot_offset;
+} SHARED_END(punctual_light, 48)
+
+SHARED_STRUCT(emissive_triangle) {
+    SHARED_VEC3(corner); // world
+    uint material;
+    SHARED_VEC3(edge1);  // second corner minus first
+    float area;          // m^2
+    SHARED_VEC3(edge2);  // third corner minus first
+    uint two_sided;
+    SHARED_VEC3(normal); // unit, geometric front side
+    uint textured;       // 1: emission varies over the triangle
+    SHARED_VEC3(emission); // nits, mean over the triangle
+    float probability;   // of choosing this triangle among all light sources, in proportion to power
+    SHARED_VEC2(uv0);    // for the emissive texture, transform applied
+    SHARED_VEC2(uv1);
+    SHARED_VEC2(uv2);
+} SHARED_END(emissive_triangle, 104)
+
+// ---- Virtual point lights
+
+SHARED_STRUCT(vpl) {
+    SHARED_VEC3(position); // world
+    float intensity;       // luminance of `color`; 0: an empty slot
+    SHARED_VEC3(color);    // cd per channel: flux * albedo / pi
+    uint path;
+    SHARED_VEC3(normal);   // unit geometric normal on the lit side
+    uint bounce;           // 0 is the first hit
+} SHARED_END(vpl, 48)
+
+// ---- The lighting grid hierarchy. Resolution exponent c: 2^c cells along the longest edge; level l of L has c = L - l.
+
+#define LGH_EXPONENTS 10      // candidate exponents 0..9, so at most 10 levels and 512 cells
+#define LGH_SCAN_WORDS 2048   // mask words that one workgroup scans
+
+#define EMISSION_DEMO 0u
+#define EMISSION_MEAN_NORMAL 1u
+#define EMISSION_A 2u
+#define EMISSION_B 3u
+#define EMISSION_AB 4u
+
+// A vertex's sums over its lights, weighted by trilinear t and w: w = intensity, or 1 for the emission model `demo`.
+SHARED_STRUCT(lgh_sums) {
+    SHARED_VEC3(color);  // sum t c
+    float weight;        // sum t w
+    SHARED_VEC3(position); // sum t w p, p relative to the vertex, metres
+    SHARED_VEC3(square);   // sum t w p^2, per axis
+    SHARED_VEC3(normal);   // sum t w n
+    SHARED_VEC3(moment_diagonal); // sum t w (nx nx, ny ny, nz nz)
+    SHARED_VEC3(moment_mixed);    // sum t w (nx ny, nx nz, ny nz)
+    uint count; // unused by shading; pads to 80 bytes
+} SHARED_END(lgh_sums, 80)
+
+SHARED_STRUCT(grid_light) {
+    SHARED_VEC3(position);  // illumination centre, world
+    float intensity;        // luminance of `color`
+    SHARED_VEC3(color);     // cd per channel, the sum over its lights
+    uint vertex;            // x | y << 10 | z << 20, on the grid of its level
+    SHARED_VEC3(deviation); // standard deviation of the lights' positions, per axis, metres
+    SHARED_VEC3(normal);    // mean normal m, not unit
+    SHARED_VEC3(moment_diagonal); // second moment M of the normals
+    SHARED_VEC3(moment_mixed);
+} SHARED_END(grid_light, 80)
+
+SHARED_STRUCT(lgh_level) { // by exponent c
+    uint occupied;    // vertices with light
+    uint first_light; // in the merged array: exponent 0 (the top) first
+    float cell_size;  // metres
+    float radius;     // r = alpha * cell_size
+} SHARED_END(lgh_level, 16)
+
+SHARED_STRUCT(lgh_dispatch) { // VkDispatchIndirectCommand, padded
+    uint x, y, z, pad;
+} SHARED_END(lgh_dispatch, 16)
+
+SHARED_STRUCT(lgh_draw) { // VkDrawIndirectCommand
+    uint vertex_count, instance_count, first_vertex, first_instance;
+} SHARED_END(lgh_draw, 16)
+
+SHARED_STRUCT(lgh_header) {
+    SHARED_VEC3(origin); // corner of the grid, world
+    float top_size;      // edge of the top level's cell, metres
+    uint level_count;    // 0: no light at all
+    uint light_count;    // grid lights of all levels
+    uint vpl_count;      // occupied slots
+    uint word_count;     // mask words of the levels in use
+    lgh_level levels[LGH_EXPONENTS];
+    lgh_dispatch light_dispatch;  // one invocation per grid light
+    lgh_dispatch first_dispatch;  // one invocation per vertex of S1
+    lgh_dispatch restrict_dispatch[LGH_EXPONENTS]; // [t] builds S_(t+1), t >= 1: one invocation per vertex
+    lgh_dispatch gather_dispatch[LGH_EXPONENTS];   // the same by one workgroup per vertex
+    lgh_draw volume_draw;       // light volumes of the levels between S1 and the top: 14 vertices an instance
+    lgh_draw volume_first_draw; // those of S1, where it is not the top
+} SHARED_END(lgh_header, 32 + 160 + 32 + 320 + 32)
+
+#endif

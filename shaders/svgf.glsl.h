@@ -1,0 +1,30 @@
+// What the steps of the filter share. The filter steers by two values: the ratio r = S / U, which lies in [0,1] however
+// many decades the light spans, and U itself. Their variances follow from the second moments E[U U], E[S U], E[S S] of
+// luminances by linearisation (delta method):
+//     Var(r) = E[(S - r U)^2] / E[U]^2        Var(U) / E[U]^2 = E[U^2] / E[U]^2 - 1
+#ifndef SVGF_GLSL_H
+#define SVGF_GLSL_H
+
+#include "filter_geometry.glsl.h"
+#include "ratio.glsl.h"
+
+// A new frame's least share of the history, which is then worth 2 / share - 1 frames. Measured on the Cornell box with
+// one sample: the settled deviation over time is 0.0097, 0.0069 and 0.0056 with 1/8, 1/16 and 1/32, the error 0.042, 0.041
+// and 0.041, while what `agreement` cannot tell from noise takes 22, 46 and 94 frames to fade.
+const float SVGF_SHARE = 1.0 / 16.0;
+
+// Independent frames that a history of `frames` frames is worth.
+float svgf_frames(float frames) { return clamp(frames, 1.0, 2.0 / SVGF_SHARE - 1.0); }
+
+// (Var(r), Var(U) / E[U]^2) of one sample from the means of U and S and the second moments (UU, SU, SS).
+vec2 svgf_variance(float unshadowed, float shadowed, vec3 moments)
+{
+    if (unshadowed <= 0.0)
+        return vec2(1.0);
+    vec3 relative = moments / max(unshadowed * unshadowed, 1e-37);
+    float r = shadowed / unshadowed;
+    float ratio = dot(vec3(r * r, -2.0 * r, 1.0), relative);
+    return clamp(vec2(ratio, relative.x - 1.0), vec2(0.0), vec2(1.0, 1e3));
+}
+
+#endif

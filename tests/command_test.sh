@@ -1,0 +1,212 @@
+#!/usr/bin/env bash
+# The command as a user meets it: what it refuses and how, what it writes, and that it writes nothing when it fails.
+# usage: command_test.sh path/to/lanternfield
+set -u
+
+lanternfield=$(realpath "$1")
+scenes=$(dirname "$lanternfield")/scenes
+{ [ -x "$lanternfield" ] && [ -s "$scenes/cornell.glb" ]; } || { echo "$lanternfield or its scenes are not built"; exit 1; }
+work=$(mktemp -d)
+trap 'cd /; umount "$work/full" 2>/dev/null; rm -rf "$work"' EXIT
+mkdir "$work/here" && cd "$work/here" || exit 1
+failures=0
+
+fail() {
+  echo "FAILED: $*"
+  failures=$((failures + 1))
+}
+
+run() {
+  "$lanternfield" "$@" >"$work/stdout" 2>"$work/stderr"
+}
+
+# refuses CODE WORD ARGUMENT...: ends with CODE and one line that has WORD in it, prints nothing else and leaves no file.
+refuses() {
+  local code=$1 word=$2 actual
+  shift 2
+  run "$@"
+  actual=$?
+  [ $actual = "$code" ] || fail "lanternfield $*: exit code $actual, expected $code"
+  grep -qF -- "$word" "$work/stderr" || fail "lanternfield $*: \"$word\" is not in: $(cat "$work/stderr")"
+  [ "$(grep -c error "$work/stderr")" = 1 ] || fail "lanternfield $*: not one line of error: $(cat "$work/stderr")"
+  [ "$code" = 1 ] || grep -qF -- --help "$work/stderr" || fail "lanternfield $*: no hint to --help"
+  [ -z "$(ls -A)" ] || { fail "lanternfield $*: left $(ls -A)"; rm -rf ./*; }
+}
+
+# renders ARGUMENT...: succeeds.
+renders() {
+  run render "$@" || fail "lanternfield render $*: exit code $?: $(cat "$work/stderr")"
+}
+
+cornell=$scenes/cornell.glb
+small=(--size 64x36 --vpls 1000 --frames 2)
+
+triangle() { # triangle NAME EXTRA: a scene of one triangle without light
+  cat >"$work/$1" <<EOT
+{"asset": {"version": "2.0"}, $2 "nodes": [{"mesh": 0}], "scenes": [{"nodes": [0]}],
+ "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
+ "accessors": [{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3", "min": [0, 0, 0], "max": [1, 1, 0]}],
+ "bufferViews": [{"buffer": 0, "byteLength": 36}],
+ "buffers": [{"byteLength": 36, "uri": "data:application/octet-stream;base64,AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAA"}]}
+EOT
+}
+
+echo "wrong usage"
+refuses 2 "command is missing"
+refuses 2 "unknown command draw" draw x.glb
+refuses 2 "needs a SCENE" render
+refuses 2 "needs a SCENE" info
+refuses 2 "other.glb" info "$cornell" other.glb
+refuses 2 "no argument" devices all
+refuses 2 "unknown option --vplz" render "$cornell" --vplz 3
+refuses 2 "unknown option -size" render "$cornell" -size 64x36
+refuses 2 "--vpls: its value is missing" render "$cornell" --vpls
+refuses 2 "--validate=yes: it takes no value" render "$cornell" --validate=yes
+refuses 2 "one SCENE is enough" render "$cornell" other.glb
+refuses 2 ".png or .exr" render "$cornell" -o picture.jpg
+refuses 2 "albedo, normal, depth" render "$cornell" --aov colour=a.exr
+refuses 2 "NAME=FILE.exr" render "$cornell" --aov depth=a.png
+refuses 2 "NAME=FILE.exr" render "$cornell" --aov depth
+refuses 2 "demo, mean-normal, A, B, AB" render "$cornell" --emission C
+refuses 2 "--alpha" render "$cornell" --alpha x
+refuses 2 "--alpha" render "$cornell" --alpha nan
+refuses 2 "--eye: expected x,y,z" render "$cornell" --eye 1,2
+refuses 2 "--eye: expected x,y,z" render "$cornell" --eye 1,2,3,4
+refuses 2 "--sun" render "$cornell" --sun 0,-1,0
+
+echo "values that cannot be used"
+refuses 1 "--size" render "$cornell" --size 0
+refuses 1 "--size" render "$cornell" --size 0x0
+refuses 1 "1 to 16384" render "$cornell" --size 100000x100000
+refuses 1 "--alpha" render "$cornell" --alpha 0
+refuses 1 "--alpha" render "$cornell" --alpha -1
+refuses 1 "--vpls" render "$cornell" --vpls 5000000
+refuses 1 "--interleave" render "$cornell" --interleave 3
+refuses 1 "--fov" render "$cornell" --fov 180
+refuses 1 "--sun" render "$cornell" --sun 0,0,0,1000
+refuses 1 "same point" render "$cornell" --eye 1,1,1 --target 1,1,1
+
+echo "files"
+refuses 1 "no-such.glb" render no-such.glb
+refuses 1 "no-such.glb" info no-such.glb
+refuses 1 "$scenes" render "$scenes"
+refuses 1 "$scenes" info "$scenes"
+: >"$work/empty.glb"
+refuses 1 "empty.glb" render "$work/empty.glb"
+head -c 300 "$cornell" >"$work/cut.glb"
+refuses 1 "cut.glb" render "$work/cut.glb"
+refuses 1 "missing/a.png" render "$cornell" -o missing/a.png
+refuses 1 "missing/a.exr" render "$cornell" -o a.png --aov depth=missing/a.exr
+refuses 1 "missing/a.json" render "$cornell" --stats missing/a.json
+refuses 1 "missing/a.dot" render "$cornell" --dump-graph missing/a.dot
+mkdir "$work/folder.png"
+refuses 1 "folder.png" render "$cornell" -o "$work/folder.png"
+refuses 1 "/dev/full" render "$cornell" --stats /dev/full
+
+echo "scenes that lack something"
+refuses 1 "attic" render "$cornell" --camera attic
+echo '{"asset": {"version": "2.0"}, "scenes": [{"nodes": []}]}' >"$work/nothing.gltf"
+refuses 1 "no geometry" render "$work/nothing.gltf"
+triangle required.gltf '"extensionsUsed": ["EXT_nonsense"], "extensionsRequired": ["EXT_nonsense"],'
+refuses 1 "EXT_nonsense" render "$work/required.gltf"
+refuses 1 "no such device" render "$cornell" --device "no such device"
+
+echo "parts of the picture that these settings do not make"
+refuses 1 "--aov shadow-u" render "$cornell" "${small[@]}" --shadow-samples 0 --aov shadow-u=a.exr
+
+if mkdir "$work/full" && mount -t tmpfs -o size=16k tmpfs "$work/full" 2>/dev/null; then
+  echo "a full disk"
+  cd "$work/full" || exit 1
+  refuses 1 "$work/full/a.exr" render "$cornell" --size 320x180 --vpls 1000 --frames 1 -o "$work/full/a.exr"
+  cd "$work/here" || exit 1
+else
+  echo "a full disk: left out, a small file system cannot be mounted here"
+fi
+
+echo "help"
+for arguments in --help -h "render --help" "render -h" "info --help" "devices --help" --version; do
+  # shellcheck disable=SC2086
+  run $arguments || fail "lanternfield $arguments: exit code $?"
+  { [ -s "$work/stdout" ] && [ ! -s "$work/stderr" ]; } || fail "lanternfield $arguments: prints to the wrong stream"
+done
+run render --help
+for option in -o --size --camera --eye --target --fov --vpls --bounces --alpha --levels --shadow-samples --interleave \
+  --emission --end-point --frames --seed --exposure --only --no-filter --no-taa --start-level --sample-s1 --sampling \
+  --reservoirs --build --s1 --singularity --sun --aov --stats --dump-graph --device --validate; do
+  grep -q -- "^  $option " "$work/stdout" || fail "render --help has no $option"
+done
+for default in "default 1280x720" "default 100000" "default 3" "default 1" "default auto" "default AB" "default jitter" \
+  "default restrict" "default ordered" "default exact" "default importance" "default 0.01" "default 8"; do
+  grep -qF "($default)" "$work/stdout" || fail "render --help has no \"$default\""
+done
+
+echo "info and devices"
+{ run info "$cornell" && grep -qi triangles "$work/stdout"; } || fail "info of the cornell box: $(cat "$work/stdout" "$work/stderr")"
+{ run devices && [ -s "$work/stdout" ]; } || fail "devices: $(cat "$work/stdout" "$work/stderr")"
+
+echo "two runs write the same bytes"
+aovs=(albedo normal depth direct indirect shadow-u shadow-s shadow-ratio lights-per-pixel)
+for n in 1 2; do
+  mkdir $n
+  arguments=()
+  for aov in "${aovs[@]}"; do arguments+=(--aov "$aov=$n/$aov.exr"); done
+  renders "$cornell" "${small[@]}" -o $n/a.png -o $n/a.exr "${arguments[@]}"
+  { [ "$(wc -l <"$work/stdout")" = 1 ] && grep -q "^wrote $n/a.png, $n/a.exr" "$work/stdout"; } || fail "closing line: $(cat "$work/stdout")"
+done
+for file in a.png a.exr "${aovs[@]/%/.exr}"; do
+  { [ -s "1/$file" ] && cmp "1/$file" "2/$file"; } || fail "$file differs between two runs"
+done
+[ "$(head -c 4 1/a.png | tail -c 3)" = PNG ] || fail "a.png is no PNG"
+rm -rf 1 2
+
+echo "statistics and the graph"
+renders "$cornell" "${small[@]}" --interleave 2 --stats a.json --dump-graph a.dot
+for key in device scene settings size frames passes ms_p50 ms_p95 steps frame_ms_p50 vpls grid_lights levels \
+  lights_per_pixel rays vpl direct shadow rays_per_pixel flux per_level gpu_memory_peak_bytes validation_messages; do
+  grep -q "\"$key\":" a.json || fail "the statistics have no \"$key\""
+done
+for module in vpl_trace lgh_build gbuffer light_volume shadow composite tonemap; do
+  grep -q "\"name\":	\"$module\"" a.json || fail "the statistics have no pass \"$module\""
+done
+grep -q '"lights_per_pixel":	[1-9]' a.json || fail "no light per pixel: $(grep lights_per_pixel a.json)"
+[ "$(tr -cd '{[' <a.json | wc -c)" = "$(tr -cd '}]' <a.json | wc -c)" ] || fail "the statistics' brackets do not match"
+grep -q digraph a.dot || fail "the dumped graph is no digraph"
+rm -f ./*
+
+echo "without virtual lights, in one frame"
+renders "$cornell" --size 33x17 --vpls 0 --frames 1 --stats a.json
+[ -s out.png ] || fail "out.png is not the default"
+grep -q '"note":' a.json || fail "no note that the only frame also counted lights"
+rm -f ./*
+
+echo "without light the picture is black, and says so"
+triangle dark.gltf ''
+renders "$work/dark.gltf" --size 64x36 --frames 1 -o dark.exr
+grep -q "no lights: the picture will be black" "$work/stderr" || fail "no warning of a black picture"
+# A picture that shows nothing at all, for comparison.
+renders "$cornell" --size 64x36 --vpls 0 --frames 1 --eye 1000,1000,1000 --target 2000,2000,2000 -o nothing.exr
+cmp dark.exr nothing.exr || fail "the scene without light is not black"
+renders "$work/dark.gltf" --size 64x36 --frames 1 --sun 0,0,-1,1000 -o sun.exr
+cmp -s dark.exr sun.exr && fail "--sun makes no light"
+rm -f ./*
+
+echo "Ctrl-C writes what there is"
+"$lanternfield" render "$cornell" --size 64x36 --vpls 1000 --frames 1000000 -o a.png --aov lights-per-pixel=b.exr \
+  >"$work/stdout" 2>"$work/stderr" &
+process=$!
+# Wait until the process catches SIGINT (bit 1 of its mask), which it does when its frames begin.
+until [[ $(sed -n 's/^SigCgt:\s*//p' /proc/$process/status 2>/dev/null) =~ [2367abef]$ ]]; do
+  kill -0 $process 2>/dev/null || break
+  sleep 0.1
+done
+sleep 0.5
+kill -INT $process
+wait $process
+code=$?
+[ $code = 130 ] || fail "interrupted: exit code $code"
+grep -q "interrupted after" "$work/stderr" || fail "interrupted, and does not say so: $(cat "$work/stderr")"
+{ [ -s a.png ] && [ ! -e b.exr ]; } || fail "interrupted: a.png is missing or b.exr is there"
+rm -f ./*
+
+echo "$failures failed"
+[ $failures = 0 ]

@@ -1,0 +1,7 @@
+// Counts the invocations, so that indirect dispatches can be checked.
+#version 460
+
+layout(local_size_x = 4) in;
+layout(set = 0, binding = 0) buffer counter_block { uint counter; };
+
+void main() { atomicAdd(counter, 1u); }

@@ -1,0 +1,96 @@
+// What the files of the `lanternfield` command share. The command is a thin user of modules/renderer.h.
+#pragma once
+
+#include "modules/renderer.h"
+
+#include <stdio.h>
+
+// Exit codes. Wrong usage is a command line that cannot be understood; a value that is understood and cannot be used is
+// a failure.
+enum { EXIT_DONE = 0, EXIT_FAILED = 1, EXIT_WRONG_USAGE = 2, EXIT_INTERRUPTED = 130 };
+
+// ---- What `lanternfield render` is asked for: lanternfield_options.c.
+enum { OUTPUTS_MAX = 8, AOVS_MAX = 16 };
+
+struct aov_info;
+typedef struct aov_request {
+    const struct aov_info *aov;
+    const char *path;
+} aov_request;
+
+typedef struct render_request { // strings belong to argv
+    const char *scene;
+    render_settings settings;
+    const char *outputs[OUTPUTS_MAX]; // .png or .exr
+    uint32_t output_count;
+    aov_request aovs[AOVS_MAX];
+    uint32_t aov_count;
+    const char *camera; // NULL: the scene's first, or one that frames the scene
+    bool has_eye, has_target, has_fov, has_sun;
+    float eye[3], target[3]; // world, metres
+    float fov; // degrees, vertical
+    float sun[4]; // direction in which the light travels, lux
+    const char *stats, *dump_graph, *device; // NULL: not asked for
+    bool validate;
+    bool help;
+} render_request;
+
+// Reads the arguments behind "render". Returns EXIT_DONE, or the exit code of an error that it has logged.
+int render_options_read(int argc, char **argv, render_request *request);
+void render_help_print(FILE *out);
+bool path_has_extension(const char *path, const char *extension); // ".png", without regard to case
+
+// ---- The rendering: lanternfield_render.c.
+int render_run(const render_request *request); // returns the exit code
+
+// ---- One line on the terminal that is rewritten, nothing in a pipe: lanternfield_progress.c.
+void progress_begin(void); // from now on log lines do not run into the progress line
+void progress_show(const char *format, ...) __attribute__((format(printf, 1, 2)));
+void progress_end(void);
+
+// ---- Pictures: lanternfield_images.c.
+const struct aov_info *aov_find(const char *name); // NULL when unknown
+void aov_names_print(char *text, size_t size); // "albedo, normal, ..."
+const char *aov_name(const struct aov_info *aov);
+bool aov_counts_lights(const struct aov_info *aov); // needs renderer.count_lights
+// Asks the renderer to keep what the picture is made from.
+void aov_export(renderer *r, const struct aov_info *aov);
+// False when this configuration does not make it. Call after a frame.
+bool aov_present(const renderer *r, const struct aov_info *aov);
+// False on failure (logged).
+bool aov_write(renderer *r, const struct aov_info *aov, const char *path);
+bool picture_write(renderer *r, const char *path);
+// Adds `name` to the renderer's exports unless it is there.
+void export_add(renderer *r, const char *name);
+// Mean of `lights_per_pixel` over the pixels that show something; negative when it is not known.
+double lights_per_pixel_mean(renderer *r);
+
+// ---- Timings and statistics: lanternfield_stats.c.
+typedef struct time_series {
+    const char *name;
+    double *milliseconds; // one a frame in which it ran
+    size_t count, capacity;
+    double current; // of the frame being added
+    bool seen;
+} time_series;
+typedef struct render_times { // zero-initialise
+    time_series *steps; // by frame graph pass, in the order of execution
+    size_t step_count, step_capacity;
+    time_series *modules; // by the part of the name before '/'
+    size_t module_count, module_capacity;
+    time_series frames; // wall clock
+    arena names;
+} render_times;
+// Adds the last frame, which took `milliseconds`.
+void render_times_add(render_times *times, const renderer *r, double milliseconds);
+double time_series_percentile(const time_series *series, double fraction); // interpolated; 0 when it is empty
+void render_times_fini(render_times *times);
+
+typedef struct render_summary {
+    const char *scene, *device;
+    uint32_t frames; // rendered
+    bool counting_is_timed; // the only frame also counted lights
+    const render_times *times;
+} render_summary;
+void stats_export(renderer *r); // asks the renderer to keep what the statistics are made from
+bool stats_write(renderer *r, const render_summary *summary, const char *path);

@@ -1,0 +1,373 @@
+// `lanternfield render`: loads a scene, renders its frames and writes what was asked for.
+#include "lanternfield.h"
+
+#include "modules/world.h"
+
+#include <errno.h>
+#include <libgen.h>
+#include <signal.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+// What one run holds.
+typedef struct render_state {
+    const render_request *request;
+    scene_data *scene;
+    gpu *gpu;
+    renderer *renderer;
+    render_times times;
+    uint32_t frames_done;
+    bool lights_counted; // by the last frame done
+} render_state;
+
+// ---- Before any work: can the files be written at all?
+
+static bool output_path_check(const char *path)
+{
+    struct stat status;
+    if (stat(path, &status) == 0 && !S_ISREG(status.st_mode)) {
+        log_error("cannot write \"%s\": it is not a regular file", path);
+        return false;
+    }
+    char *const copy = strdup(path);
+    const char *const folder = dirname(copy);
+    const bool is_folder = stat(folder, &status) == 0 && S_ISDIR(status.st_mode);
+    const bool ok = is_folder && access(folder, W_OK) == 0;
+    if (!is_folder) {
+        log_error("cannot write \"%s\": there is no folder \"%s\"", path, folder);
+    } else if (!ok) {
+        log_error("cannot write \"%s\": folder \"%s\": %s", path, folder, strerror(errno));
+    }
+    free(copy);
+    return ok;
+}
+
+static bool output_paths_check(const render_request *request)
+{
+    bool ok = true;
+    for (uint32_t i = 0; i < request->output_count; i++) {
+        ok = output_path_check(request->outputs[i]) && ok;
+    }
+    for (uint32_t i = 0; i < request->aov_count; i++) {
+        ok = output_path_check(request->aovs[i].path) && ok;
+    }
+    ok = (!request->stats || output_path_check(request->stats)) && ok;
+    return (!request->dump_graph || output_path_check(request->dump_graph)) && ok;
+}
+
+// ---- Camera and light
+
+// False, and the cameras are listed, when the one that is asked for does not exist.
+static bool camera_find(const scene_data *scene, const char *name, uint32_t *camera)
+{
+    *camera = scene->camera_count > 0 ? 0 : SCENE_NONE;
+    if (!name) {
+        return true;
+    }
+    *camera = scene_camera_find(scene, name);
+    if (*camera != SCENE_NONE) {
+        return true;
+    }
+    arena names = {0};
+    const char *list = scene->camera_count > 0 ? "its cameras are" : "it has no camera";
+    for (uint32_t i = 0; i < scene->camera_count; i++) {
+        list = arena_printf(&names, "%s%s \"%s\"", list, i ? "," : "", scene->cameras[i].name);
+    }
+    log_error("%s: there is no camera \"%s\"; %s", scene->path, name, list);
+    arena_fini(&names);
+    return false;
+}
+
+static bool camera_place(renderer *r, const render_request *request, uint32_t camera)
+{
+    r->camera = renderer_camera_of_scene(r, camera);
+    if (request->has_fov) {
+        r->camera.yfov = request->fov * (3.14159265f / 180);
+    }
+    if (!request->has_eye && !request->has_target) {
+        return true;
+    }
+    if (request->has_eye) {
+        memcpy(r->camera.eye, request->eye, sizeof(r->camera.eye));
+        for (int k = 0; k < 3; k++) {
+            r->camera.target[k] = 0.5f * (r->scene->bounds_min[k] + r->scene->bounds_max[k]);
+        }
+    }
+    if (request->has_target) {
+        memcpy(r->camera.target, request->target, sizeof(r->camera.target));
+    }
+    memcpy(r->camera.up, (const float[3]){0, 1, 0}, sizeof(r->camera.up));
+    if (memcmp(r->camera.eye, r->camera.target, sizeof(r->camera.eye)) == 0) {
+        log_error("the camera's position and target are the same point (%g,%g,%g)", (double)r->camera.eye[0],
+                  (double)r->camera.eye[1], (double)r->camera.eye[2]);
+        return false;
+    }
+    return true;
+}
+
+// ---- Memory
+
+// A device that is the CPU takes what it likes until the system ends the process, so what a picture needs at least is
+// compared with what there is; other devices refuse an allocation by themselves.
+static bool memory_check(const gpu *gpu, const render_settings *settings)
+{
+    // Measured: G-buffer and read-back, and with indirect light its images and their history.
+    const bool has_indirect = settings->vpls > 0 && settings->only != ONLY_DIRECT;
+    const double needed = (double)settings->width * settings->height * (has_indirect ? 300 : 100);
+    double available = (double)sysconf(_SC_AVPHYS_PAGES) * (double)sysconf(_SC_PAGESIZE);
+    FILE *const file = fopen("/proc/meminfo", "r");
+    char line[128];
+    double kilobytes;
+    while (file && fgets(line, sizeof(line), file)) {
+        if (sscanf(line, "MemAvailable: %lf kB", &kilobytes) == 1) {
+            available = 1024 * kilobytes; // counts what the file cache would give back
+        }
+    }
+    if (file) {
+        fclose(file);
+    }
+    if (gpu_is_cpu(gpu) && needed > available) {
+        log_error("--size %ux%u needs about %.1f GB of memory, and %.1f GB are free", settings->width, settings->height,
+                  needed * 1e-9, available * 1e-9);
+        return false;
+    }
+    return true;
+}
+
+// ---- Ctrl-C: the frame is finished and written; a second one ends the process.
+
+static volatile sig_atomic_t interrupted;
+
+static void interrupt_note(int number)
+{
+    (void)number;
+    interrupted = 1;
+}
+
+static void interrupt_watch(void)
+{
+    const struct sigaction action = {.sa_handler = interrupt_note, .sa_flags = (int)SA_RESETHAND | SA_RESTART};
+    sigaction(SIGINT, &action, NULL);
+}
+
+// ---- Frames
+
+static bool wants_light_count(const render_request *request)
+{
+    bool wanted = request->stats != NULL;
+    for (uint32_t i = 0; i < request->aov_count; i++) {
+        wanted = wanted || aov_counts_lights(request->aovs[i].aov);
+    }
+    return wanted;
+}
+
+static void exports_set(renderer *r, const render_request *request)
+{
+    for (uint32_t i = 0; i < request->aov_count; i++) {
+        aov_export(r, request->aovs[i].aov);
+    }
+    if (request->stats) {
+        stats_export(r);
+    }
+}
+
+// Whether the frame just rendered made the parts of the picture that are asked for.
+static bool aovs_check(const render_state *state)
+{
+    bool ok = true;
+    for (uint32_t i = 0; i < state->request->aov_count; i++) {
+        const struct aov_info *const aov = state->request->aovs[i].aov;
+        const bool expected = !aov_counts_lights(aov) || state->lights_counted;
+        if (expected && !aov_present(state->renderer, aov)) {
+            log_error("--aov %s: these settings and this scene do not make it", aov_name(aov));
+            ok = false;
+        }
+    }
+    return ok;
+}
+
+static void progress_show_frame(uint32_t frame, uint32_t frames, double seconds_so_far)
+{
+    char left[64] = "";
+    if (frame > 0) {
+        const double seconds = seconds_so_far / frame * (frames - frame);
+        snprintf(left, sizeof(left), seconds < 90 ? "%.0f s left" : "%.0f min left",
+                 seconds < 90 ? seconds : seconds / 60);
+    }
+    progress_show("frame %u/%u  %.0f %%  %s", frame + 1, frames, 100.0 * frame / frames, left);
+}
+
+// Warns of a black picture, and refuses parts of the picture that are not made, before the other frames are rendered.
+static bool first_frame_check(const render_state *state)
+{
+    if (state->renderer->gpu_world->light_power <= 0) {
+        log_warning("%s: no lights: the picture will be black", state->scene->path);
+    }
+    return aovs_check(state);
+}
+
+static bool frames_render(render_state *state)
+{
+    renderer *const r = state->renderer;
+    const uint32_t frames = r->settings.frames;
+    const bool wants_count = wants_light_count(state->request);
+    const double start = time_now();
+    while (state->frames_done < frames && !interrupted) {
+        progress_show_frame(state->frames_done, frames, time_now() - start);
+        // Counting costs time, so only the last frame does, and is left out of the timings.
+        r->count_lights = wants_count && state->frames_done + 1 == frames;
+        const double frame_start = time_now();
+        if (!renderer_frame(r)) {
+            return false;
+        }
+        if (!r->count_lights || frames == 1) {
+            render_times_add(&state->times, r, 1000 * (time_now() - frame_start));
+        }
+        state->lights_counted = r->count_lights;
+        if (state->frames_done++ == 0 && !first_frame_check(state)) {
+            return false;
+        }
+    }
+    return frames == 1 || aovs_check(state);
+}
+
+// ---- What is left behind
+
+static bool graph_write(const renderer *r, const char *path)
+{
+    const bool as_text = path_has_extension(path, ".txt");
+    char *const text = as_text ? frame_graph_dump_text(r->graph) : frame_graph_dump_dot(r->graph);
+    const bool ok = file_write(path, text, strlen(text));
+    free(text);
+    return ok;
+}
+
+static bool statistics_write(const render_state *state)
+{
+    const render_summary summary = {
+        .scene = state->scene->path,
+        .device = gpu_name(state->gpu),
+        .frames = state->frames_done,
+        .counting_is_timed = state->lights_counted && state->frames_done == 1,
+        .times = &state->times,
+    };
+    return stats_write(state->renderer, &summary, state->request->stats);
+}
+
+// Adds a file to the summary when it was written.
+static bool note_written(arena *names, const char **list, const char *path, bool ok)
+{
+    if (ok) {
+        *list = **list ? arena_printf(names, "%s, %s", *list, path) : path;
+    }
+    return ok;
+}
+
+// Writes every file, even when another cannot be written, and prints the closing line.
+static bool outputs_write(const render_state *state)
+{
+    const render_request *const request = state->request;
+    renderer *const r = state->renderer;
+    arena names = {0};
+    const char *list = "";
+    bool ok = true;
+    progress_show("write");
+    for (uint32_t i = 0; i < request->output_count; i++) {
+        const char *const path = request->outputs[i];
+        ok = note_written(&names, &list, path, picture_write(r, path)) && ok;
+    }
+    for (uint32_t i = 0; i < request->aov_count; i++) {
+        const aov_request *const aov = &request->aovs[i];
+        if (aov_counts_lights(aov->aov) && !state->lights_counted) {
+            log_warning("\"%s\" is not written: lights are counted in the last frame", aov->path);
+            continue;
+        }
+        ok = note_written(&names, &list, aov->path, aov_write(r, aov->aov, aov->path)) && ok;
+    }
+    if (request->dump_graph) {
+        ok = note_written(&names, &list, request->dump_graph, graph_write(r, request->dump_graph)) && ok;
+    }
+    if (request->stats) {
+        ok = note_written(&names, &list, request->stats, statistics_write(state)) && ok;
+    }
+    progress_end();
+    if (*list) {
+        printf("wrote %s: %ux%u, %u frame%s, %.1f ms a frame on %s\n", list, r->settings.width, r->settings.height,
+               state->frames_done, state->frames_done == 1 ? "" : "s",
+               time_series_percentile(&state->times.frames, 0.5), gpu_name(state->gpu));
+    }
+    arena_fini(&names);
+    return ok;
+}
+
+static bool validation_check(const render_state *state)
+{
+    const uint32_t messages = state->request->validate ? gpu_validation_messages(state->gpu) : 0;
+    if (messages > 0) {
+        log_error("the validation layer reported %u message%s", messages, messages == 1 ? "" : "s");
+    }
+    return messages == 0;
+}
+
+// ---- From nothing to a renderer
+
+static bool render_open(render_state *state)
+{
+    const render_request *const request = state->request;
+    uint32_t camera;
+    progress_show("load %s", request->scene);
+    state->scene = scene_load(request->scene);
+    if (!state->scene || !camera_find(state->scene, request->camera, &camera)) {
+        return false;
+    }
+    if (state->scene->instanced_triangles == 0) {
+        log_error("%s: no geometry: there is nothing to render", request->scene);
+        return false;
+    }
+    const gpu_desc desc = {.device = request->device, .validation = request->validate};
+    state->gpu = gpu_create(&desc);
+    if (!state->gpu || !memory_check(state->gpu, &request->settings)) {
+        return false;
+    }
+    progress_show("upload %s", request->scene);
+    state->renderer = renderer_create(state->gpu, state->scene, &request->settings);
+    if (!state->renderer || !camera_place(state->renderer, request, camera)) {
+        return false;
+    }
+    if (request->has_sun) {
+        world_sun_add(state->renderer, request->sun, request->sun[3]);
+    }
+    exports_set(state->renderer, request);
+    return true;
+}
+
+static void render_close(render_state *state)
+{
+    renderer_destroy(state->renderer);
+    gpu_destroy(state->gpu);
+    scene_destroy(state->scene);
+    render_times_fini(&state->times);
+}
+
+int render_run(const render_request *request)
+{
+    if (!output_paths_check(request)) {
+        return EXIT_FAILED;
+    }
+    render_state state = {.request = request};
+    progress_begin();
+    bool ok = render_open(&state);
+    if (ok) {
+        interrupt_watch();
+        ok = frames_render(&state) && outputs_write(&state) && validation_check(&state);
+    }
+    progress_end();
+    if (ok && interrupted) {
+        log_info("interrupted after %u of %u frames; what there was is written", state.frames_done,
+                 request->settings.frames);
+    }
+    render_close(&state);
+    return !ok ? EXIT_FAILED : interrupted ? EXIT_INTERRUPTED : EXIT_DONE;
+}

@@ -1,0 +1,299 @@
+// Procedural textures that tile; see the header.
+#include "tools/make_scenes_texture.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+#pragma GCC diagnostic push
+#pragma GCC diagnostic ignored "-Wunused-function"
+#pragma GCC diagnostic ignored "-Wmissing-field-initializers"
+#define STB_IMAGE_WRITE_STATIC
+#define STB_IMAGE_WRITE_IMPLEMENTATION
+#include <stb/stb_image_write.h>
+#pragma GCC diagnostic pop
+
+enum { SIZE = 512 };
+static const float pi = 3.14159265358979f;
+
+static float clamp01(float x)
+{
+    return fminf(fmaxf(x, 0), 1);
+}
+
+static float mix(float a, float b, float t)
+{
+    return a + (b - a) * t;
+}
+
+static vec3 mix3(vec3 a, vec3 b, float t)
+{
+    return vec3_add(vec3_scale(a, 1 - t), vec3_scale(b, t));
+}
+
+static float smooth(float low, float high, float x)
+{
+    const float t = clamp01((x - low) / (high - low));
+    return t * t * (3 - 2 * t);
+}
+
+static float fract(float x)
+{
+    return x - floorf(x);
+}
+
+static int wrap(int i, int period)
+{
+    return (i % period + period) % period;
+}
+
+// Uniform in [0, 1).
+static float lattice(int x, int y, uint32_t seed)
+{
+    random_sequence sequence = {(uint64_t)(uint32_t)x << 40 ^ (uint64_t)(uint32_t)y << 16 ^ seed};
+    random_uniform(&sequence, 0, 1);
+    sequence.state ^= sequence.state >> 29;
+    random_uniform(&sequence, 0, 1);
+    return random_uniform(&sequence, 0, 1);
+}
+
+// Value noise in [0, 1] over a lattice of columns x rows cells, periodic.
+static float noise(float u, float v, int columns, int rows, uint32_t seed)
+{
+    const float x = u * (float)columns, y = v * (float)rows;
+    const int x0 = wrap((int)floorf(x), columns), y0 = wrap((int)floorf(y), rows);
+    const int x1 = wrap(x0 + 1, columns), y1 = wrap(y0 + 1, rows);
+    const float tx = smooth(0, 1, fract(x)), ty = smooth(0, 1, fract(y));
+    return mix(mix(lattice(x0, y0, seed), lattice(x1, y0, seed), tx),
+               mix(lattice(x0, y1, seed), lattice(x1, y1, seed), tx), ty);
+}
+
+// Four or so octaves of noise, in about [-1, 1].
+static float fractal_noise(float u, float v, int cells, int octaves, uint32_t seed)
+{
+    float sum = 0, amplitude = 1;
+    for (int i = 0; i < octaves; i++, cells *= 2, amplitude /= 2)
+        sum += amplitude * (noise(u, v, cells, cells, seed + (uint32_t)i) - 0.5f);
+    return sum;
+}
+
+typedef struct masonry_place {
+    float edge; // metres to the nearest edge of the block
+    float tone; // uniform in [0, 1), its own for each block
+    int column, row;
+} masonry_place;
+
+// Courses of blocks, every second one moved by `shift` of a block; one repeat covers `repeat` metres.
+static masonry_place masonry(float u, float v, int columns, int rows, float shift, float repeat, uint32_t seed)
+{
+    const float y = v * (float)rows;
+    const int row = wrap((int)floorf(y), rows);
+    const float x = u * (float)columns + (row % 2 ? shift : 0);
+    const int column = wrap((int)floorf(x), columns);
+    const float side = fminf(fract(x), 1 - fract(x)) * repeat / (float)columns;
+    const float end = fminf(fract(y), 1 - fract(y)) * repeat / (float)rows;
+    return (masonry_place){fminf(side, end), lattice(column, row, seed), column, row};
+}
+
+texel texture_ashlar(float u, float v)
+{
+    const masonry_place place = masonry(u, v, 2, 4, 0.5f, 1.6f, 11);
+    const float grain = fractal_noise(u, v, 32, 5, 12), stains = fractal_noise(u, v, 4, 3, 17);
+    const float block = smooth(0.003f, 0.009f, place.edge + 0.002f * grain);
+    const vec3 pale = {0.60f, 0.52f, 0.40f}, dark = {0.50f, 0.40f, 0.29f}, mortar = {0.40f, 0.36f, 0.30f};
+    const vec3 stone = vec3_scale(mix3(dark, pale, place.tone), 1 + 0.16f * grain + 0.10f * stains);
+    return (texel){
+        .albedo = mix3(mortar, stone, block),
+        .height = 0.008f * smooth(0.002f, 0.018f, place.edge) + 0.003f * grain + 0.002f * place.tone,
+    };
+}
+
+texel texture_brick(float u, float v)
+{
+    const masonry_place place = masonry(u, v, 4, 12, 0.5f, 1, 21);
+    const float grain = fractal_noise(u, v, 48, 4, 22);
+    const float block = smooth(0.004f, 0.008f, place.edge + 0.003f * grain);
+    const vec3 pale = {0.46f, 0.24f, 0.15f}, dark = {0.28f, 0.12f, 0.08f}, mortar = {0.44f, 0.40f, 0.34f};
+    const vec3 brick = vec3_scale(mix3(dark, pale, place.tone), 1 + 0.3f * grain);
+    return (texel){
+        .albedo = mix3(mortar, brick, block),
+        .height = 0.006f * smooth(0.003f, 0.011f, place.edge) + 0.002f * grain + 0.002f * place.tone,
+    };
+}
+
+texel texture_limestone(float u, float v)
+{
+    const float clouds = fractal_noise(u, v, 4, 4, 31), grain = fractal_noise(u, v, 64, 3, 32);
+    return (texel){.albedo = vec3_scale((vec3){0.66f, 0.61f, 0.52f}, 1 + 0.12f * clouds + 0.08f * grain)};
+}
+
+texel texture_plaster(float u, float v)
+{
+    const float clouds = fractal_noise(u, v, 3, 5, 41), grain = fractal_noise(u, v, 64, 3, 42);
+    return (texel){.albedo = vec3_scale((vec3){0.70f, 0.66f, 0.59f}, 1 + 0.10f * clouds + 0.05f * grain)};
+}
+
+texel texture_paving(float u, float v)
+{
+    const masonry_place place = masonry(u, v, 4, 4, 0, 2.4f, 51);
+    const float clouds = fractal_noise(u, v, 8, 5, 52), grain = fractal_noise(u, v, 64, 3, 53);
+    const float slab = smooth(0.003f, 0.008f, place.edge);
+    const vec3 warm = {0.53f, 0.46f, 0.36f}, grey = {0.42f, 0.40f, 0.36f}, joint = {0.22f, 0.20f, 0.17f};
+    const bool checker = (place.column + place.row) % 2;
+    const vec3 stone = vec3_scale(checker ? warm : grey, 0.9f + 0.2f * place.tone + 0.18f * clouds + 0.08f * grain);
+    return (texel){
+        .albedo = mix3(joint, stone, slab),
+        .height = 0.004f * smooth(0.002f, 0.012f, place.edge) + 0.0015f * clouds,
+    };
+}
+
+texel texture_marble(float u, float v)
+{
+    const masonry_place place = masonry(u, v, 2, 2, 0, 1.2f, 61);
+    // Veins lie where a warped noise crosses its middle; every tile has its own.
+    const float shift = place.tone;
+    const float warp = 0.25f * fractal_noise(u + shift, v, 4, 4, 62);
+    const float ridge = fabsf(fractal_noise(u + warp, v + shift + warp, 3, 4, 63));
+    const float vein = 1 - smooth(0, 0.09f, ridge), clouds = fractal_noise(u, v + shift, 5, 4, 64);
+    const bool is_dark = (place.column + place.row) % 2;
+    const vec3 light = mix3((vec3){0.70f, 0.66f, 0.59f}, (vec3){0.46f, 0.42f, 0.37f}, 0.7f * vein);
+    const vec3 dark = mix3((vec3){0.13f, 0.10f, 0.09f}, (vec3){0.38f, 0.30f, 0.24f}, 0.6f * vein);
+    const vec3 stone = vec3_scale(is_dark ? dark : light, 1 + 0.10f * clouds);
+    return (texel){.albedo = mix3((vec3){0.24f, 0.21f, 0.18f}, stone, smooth(0.001f, 0.004f, place.edge))};
+}
+
+texel texture_wood(float u, float v)
+{
+    const masonry_place plank = masonry(u, v, 1, 4, 0.5f, 1, 71);
+    const float rings = noise(u + plank.tone, v, 3, 40, 72) + 0.5f * noise(u, v, 6, 96, 73) - 0.75f;
+    const float fibres = noise(u, v, 16, 256, 74) - 0.5f;
+    const float gap = smooth(0.001f, 0.004f, fminf(fract(v * 4), 1 - fract(v * 4)) / 4);
+    const float tone = 0.8f + 0.35f * plank.tone + 0.45f * rings + 0.2f * fibres;
+    return (texel){.albedo = vec3_scale((vec3){0.34f, 0.21f, 0.12f}, tone * mix(0.35f, 1, gap))};
+}
+
+// A plain weave with a woven border of lozenges between pairs of stripes.
+static texel cloth(float u, float v, vec3 ground, vec3 figure, uint32_t seed)
+{
+    enum { THREADS = 96 };
+    const float x = u * THREADS, y = v * THREADS;
+    const bool warp_on_top = ((int)floorf(x) + (int)floorf(y)) % 2;
+    const float bulge =
+        warp_on_top ? sinf(pi * fract(y)) * sinf(pi * fract(x)) : sinf(pi * fract(x)) * sinf(pi * fract(y));
+    const float slub = noise(u, v, THREADS, 6, seed) + noise(u, v, 6, THREADS, seed + 1) - 1;
+
+    // The figure follows whole threads.
+    const float fx = fract(floorf(x) / THREADS * 4) - 0.5f, fy = fract(floorf(y) / THREADS * 2) - 0.5f;
+    const float lozenge = fabsf(fx) / 0.42f + fabsf(fy) / 0.30f;
+    const bool is_lozenge = (lozenge < 1 && lozenge > 0.72f) || lozenge < 0.32f;
+    const bool is_stripe = (fabsf(fy) > 0.36f && fabsf(fy) < 0.40f) || (fabsf(fy) > 0.43f && fabsf(fy) < 0.45f);
+    const vec3 dye = is_lozenge || is_stripe ? figure : ground;
+    return (texel){.albedo = vec3_scale(dye, 0.82f + 0.22f * bulge + (warp_on_top ? 0.06f : 0) + 0.15f * slub)};
+}
+
+texel texture_cloth_red(float u, float v)
+{
+    return cloth(u, v, (vec3){0.50f, 0.055f, 0.045f}, (vec3){0.60f, 0.34f, 0.10f}, 81);
+}
+
+texel texture_cloth_ochre(float u, float v)
+{
+    return cloth(u, v, (vec3){0.64f, 0.38f, 0.09f}, (vec3){0.40f, 0.10f, 0.05f}, 83);
+}
+
+texel texture_cloth_blue(float u, float v)
+{
+    return cloth(u, v, (vec3){0.06f, 0.13f, 0.40f}, (vec3){0.55f, 0.50f, 0.38f}, 85);
+}
+
+// Leaflets on both sides of a rib, longest at a third of the way; x in [-1, 1] across, y in [0, 1] from stalk to tip.
+static texel frond(float x, float y)
+{
+    enum { LEAFLETS = 15 };
+    const float away = fabsf(x), reach = 0.98f * powf(sinf(pi * powf(clamp01(0.06f + 0.94f * y), 0.6f)), 0.6f);
+    // Leaflets point forward: their row is found where they leave the rib.
+    const float row = (y - 0.16f * away) * LEAFLETS + (x > 0 ? 0.5f : 0);
+    const float across = fabsf(fract(row) - 0.5f) * 2;
+    const float taper = 0.86f * sqrtf(clamp01(1 - away / fmaxf(reach, 1e-3f)));
+    const bool is_rib = away < 0.035f * (1.3f - y);
+    const bool is_leaflet = row > 0 && y < 0.985f && away < reach && across < taper;
+    const float tone = 0.75f + 0.35f * lattice((int)floorf(row), x > 0, 91) + 0.25f * (1 - across);
+    return (texel){
+        .albedo = is_rib ? (vec3){0.22f, 0.25f, 0.09f} : vec3_scale((vec3){0.11f, 0.22f, 0.06f}, tone),
+        .alpha = is_rib || is_leaflet ? 1 : 0,
+    };
+}
+
+static texel broad_leaf(float x, float y)
+{
+    const float away = fabsf(x), reach = 0.94f * powf(sinf(pi * powf(y, 0.75f)), 0.8f);
+    const float vein = fabsf(fract((y - 0.25f * away) * 9) - 0.5f) * 2;
+    const bool is_rib = away < 0.04f * (1.3f - y), is_leaf = away < reach && y < 0.99f;
+    const float light = 1 - 0.35f * smooth(0.85f, 1, vein) + 0.5f * fractal_noise(x / 2, y, 8, 3, 92);
+    return (texel){
+        .albedo = is_rib ? (vec3){0.26f, 0.30f, 0.12f} : vec3_scale((vec3){0.12f, 0.25f, 0.09f}, light),
+        .alpha = is_rib || is_leaf ? 1 : 0,
+    };
+}
+
+texel texture_leaves(float u, float v)
+{
+    const float half = fract(2 * u) * 2 - 1;
+    return u < 0.5f ? frond(half, 1 - v) : broad_leaf(half, 1 - v);
+}
+
+static uint8_t srgb_byte(float linear)
+{
+    const float x = clamp01(linear);
+    const float encoded = x <= 0.0031308f ? 12.92f * x : 1.055f * powf(x, 1 / 2.4f) - 0.055f;
+    return (uint8_t)(encoded * 255 + 0.5f);
+}
+
+static gltf_texture png_add(gltf_file *file, const char *name, const uint8_t *pixels, int channels)
+{
+    int size = 0;
+    uint8_t *png = stbi_write_png_to_mem(pixels, SIZE * channels, SIZE, SIZE, channels, &size);
+    const gltf_texture texture = gltf_texture_add(file, name, png, (size_t)size);
+    free(png);
+    return texture;
+}
+
+gltf_texture texture_add(gltf_file *file, const char *name, texture_recipe recipe, bool has_alpha)
+{
+    const size_t channels = has_alpha ? 4 : 3;
+    uint8_t *pixels = memory_alloc(SIZE * SIZE * channels), *to = pixels;
+    for (int y = 0; y < SIZE; y++)
+        for (int x = 0; x < SIZE; x++, to += channels) {
+            const texel place = recipe(((float)x + 0.5f) / SIZE, ((float)y + 0.5f) / SIZE);
+            to[0] = srgb_byte(place.albedo.x);
+            to[1] = srgb_byte(place.albedo.y);
+            to[2] = srgb_byte(place.albedo.z);
+            if (has_alpha)
+                to[3] = (uint8_t)(place.alpha * 255);
+        }
+    const gltf_texture texture = png_add(file, name, pixels, (int)channels);
+    free(pixels);
+    return texture;
+}
+
+gltf_texture texture_normals_add(gltf_file *file, const char *name, texture_recipe recipe, float repeat)
+{
+    float *heights = memory_alloc(SIZE * SIZE * sizeof *heights);
+    for (int i = 0; i < SIZE * SIZE; i++)
+        heights[i] = recipe(((float)(i % SIZE) + 0.5f) / SIZE, ((float)(i / SIZE) + 0.5f) / SIZE).height;
+
+    uint8_t *pixels = memory_alloc(SIZE * SIZE * 3), *to = pixels;
+    const float two_texels = 2 * repeat / SIZE;
+    for (int y = 0; y < SIZE; y++)
+        for (int x = 0; x < SIZE; x++, to += 3) {
+            const float right = heights[y * SIZE + wrap(x + 1, SIZE)], left = heights[y * SIZE + wrap(x - 1, SIZE)];
+            const float below = heights[wrap(y + 1, SIZE) * SIZE + x], above = heights[wrap(y - 1, SIZE) * SIZE + x];
+            const vec3 normal = vec3_normalize((vec3){(left - right) / two_texels, (below - above) / two_texels, 1});
+            to[0] = (uint8_t)(127.5f + 127.5f * normal.x + 0.5f);
+            to[1] = (uint8_t)(127.5f + 127.5f * normal.y + 0.5f);
+            to[2] = (uint8_t)(127.5f + 127.5f * normal.z + 0.5f);
+        }
+    free(heights);
+    const gltf_texture texture = png_add(file, name, pixels, 3);
+    free(pixels);
+    return texture;
+}
