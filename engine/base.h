@@ -9,11 +9,23 @@
 
 #define countof(array) (sizeof(array) / sizeof((array)[0]))
 
-static inline uint32_t min_u32(uint32_t a, uint32_t b) { return a < b ? a : b; }
-static inline uint32_t max_u32(uint32_t a, uint32_t b) { return a > b ? a : b; }
-static inline uint32_t div_up_u32(uint32_t a, uint32_t b) { return (a + b - 1) / b; }
+static inline uint32_t min_u32(uint32_t a, uint32_t b)
+{
+    return a < b ? a : b;
+}
+static inline uint32_t max_u32(uint32_t a, uint32_t b)
+{
+    return a > b ? a : b;
+}
+static inline uint32_t div_up_u32(uint32_t a, uint32_t b)
+{
+    return (a + b - 1) / b;
+}
 // `alignment` is a power of two.
-static inline uint64_t align_up(uint64_t value, uint64_t alignment) { return (value + alignment - 1) & ~(alignment - 1); }
+static inline uint64_t align_up(uint64_t value, uint64_t alignment)
+{
+    return (value + alignment - 1) & ~(alignment - 1);
+}
 
 // ---- Log. One line a call, no trailing newline in the format.
 //
@@ -33,7 +45,7 @@ void log_write(log_level level, const char *format, ...) __attribute__((format(p
 // ---- Memory. Running out of memory is not recoverable here: these log and abort, and never return NULL.
 void *memory_alloc(size_t size); // zeroed
 void *memory_realloc(void *pointer, size_t size);
-// Grows `*items` so that it holds at least `count` items of `item_size`; new space is zeroed. Doubles, so amortised O(1).
+// Grows `*items` so that it holds at least `count` items of `item_size`, by doubling; new space is zeroed.
 void memory_reserve(void **items, size_t *capacity, size_t count, size_t item_size);
 
 // Bump allocator: allocations live until the next reset. Zero-initialise to use; keeps its largest block over resets,
@@ -48,8 +60,8 @@ void arena_reset(arena *arena); // O(blocks); invalidates all that was allocated
 void arena_fini(arena *arena);
 
 // ---- Files.
-// Reads a whole regular file into memory_alloc'd bytes (free() them), with one zero byte after the end. Returns NULL and
-// logs the reason when the file is missing, a directory or unreadable.
+// Reads a whole regular file into memory_alloc'd bytes (free() them), with one zero byte after the end. Returns NULL
+// and logs the reason when the file is missing, a directory or unreadable.
 uint8_t *file_read(const char *path, size_t *size);
 // Writes beside `path` and renames, so that `path` is either whole or untouched. Returns false and logs on failure
 // (no such folder, disk full, ...), leaving nothing behind.

@@ -18,7 +18,7 @@ typedef struct ecs_world ecs_world;
 
 typedef struct component_desc {
     const char *name; // unique; for messages and for looking up by name; copied
-    size_t size;      // bytes; 0 makes a tag without data
+    size_t size; // bytes; 0 makes a tag without data
     // Called just before a component is removed, its entity destroyed or the world destroyed; types registered later go
     // first. It may read other components and destroy entities, but add nothing. NULL: nothing to release.
     void (*fini)(void *component, void *user);
@@ -27,10 +27,10 @@ typedef struct component_desc {
 
 // The phases of a frame, in order.
 typedef enum ecs_phase {
-    ECS_PHASE_INPUT,   // scripts, user input, animation
-    ECS_PHASE_UPDATE,  // transforms and whatever follows from them
+    ECS_PHASE_INPUT, // scripts, user input, animation
+    ECS_PHASE_UPDATE, // transforms and whatever follows from them
     ECS_PHASE_EXTRACT, // copy what the GPU needs into buffers
-    ECS_PHASE_RENDER,  // declare the frame graph and execute it
+    ECS_PHASE_RENDER, // declare the frame graph and execute it
     ECS_PHASE_COUNT
 } ecs_phase;
 
@@ -58,7 +58,7 @@ component_type ecs_component_find(const ecs_world *world, const char *name); // 
 // Adding to a dead entity is a programmer's error (asserted).
 void *ecs_add(ecs_world *world, entity e, component_type type);
 void *ecs_get(const ecs_world *world, entity e, component_type type); // NULL when absent or the entity is dead
-void ecs_remove(ecs_world *world, entity e, component_type type);    // absent: nothing happens
+void ecs_remove(ecs_world *world, entity e, component_type type); // absent: nothing happens
 size_t ecs_count(const ecs_world *world, component_type type);
 
 // Iterates over all components of one type in dense order:

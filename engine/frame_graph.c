@@ -1,7 +1,6 @@
 // The frame graph on the device: collects declarations, has them compiled, keeps the physical objects, and records the
 // plan. See frame_graph.h.
 #include "frame_graph.h"
-#include "gpu_internal.h" // gpu_format_aspect
 
 #include <stdlib.h>
 #include <string.h>

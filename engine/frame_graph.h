@@ -3,8 +3,9 @@
 // objects are cached, so a frame that declares what the last one did allocates nothing.
 //
 //     frame_graph_begin(graph);
-//     frame_graph_pass *pass = frame_graph_pass_add(graph, &(frame_graph_pass_desc){.name = "tonemap", .kind = ..., .execute = tonemap, .user = state});
-//     frame_graph_read(pass, "radiance", ACCESS_STORAGE_READ);          // binding 0
+//     const frame_graph_pass_desc tonemap = {.name = "tonemap", .kind = ..., .execute = ..., .user = ...};
+//     frame_graph_pass *pass = frame_graph_pass_add(graph, &tonemap);
+//     frame_graph_read(pass, "radiance", ACCESS_STORAGE_READ); // binding 0
 //     frame_graph_create_resource(pass, "display", &desc, ACCESS_STORAGE_WRITE); // binding 1
 //     frame_graph_export(graph, "display", ACCESS_TRANSFER_READ);
 //     ok = frame_graph_execute(graph);
@@ -42,16 +43,21 @@ void frame_graph_destroy(frame_graph *graph); // accepts NULL
 
 // ---- Declare. Names are copied.
 void frame_graph_begin(frame_graph *graph); // forgets the last frame's passes, keeps its history
-void frame_graph_import_buffer(frame_graph *graph, const char *name, gpu_buffer buffer, frame_graph_access before, frame_graph_access after);
-void frame_graph_import_image(frame_graph *graph, const char *name, gpu_image image, frame_graph_access before, frame_graph_access after);
-void frame_graph_import_acceleration(frame_graph *graph, const char *name, gpu_acceleration acceleration, frame_graph_access before, frame_graph_access after);
+void frame_graph_import_buffer(frame_graph *graph, const char *name, gpu_buffer buffer, frame_graph_access before,
+                               frame_graph_access after);
+void frame_graph_import_image(frame_graph *graph, const char *name, gpu_image image, frame_graph_access before,
+                              frame_graph_access after);
+void frame_graph_import_acceleration(frame_graph *graph, const char *name, gpu_acceleration acceleration,
+                                     frame_graph_access before, frame_graph_access after);
 frame_graph_pass *frame_graph_pass_add(frame_graph *graph, const frame_graph_pass_desc *desc);
-void frame_graph_create_resource(frame_graph_pass *pass, const char *name, const frame_graph_resource_desc *desc, frame_graph_access access);
-void frame_graph_create_cleared(frame_graph_pass *pass, const char *name, const frame_graph_resource_desc *desc, frame_graph_access access, VkClearValue value);
+void frame_graph_create_resource(frame_graph_pass *pass, const char *name, const frame_graph_resource_desc *desc,
+                                 frame_graph_access access);
+void frame_graph_create_cleared(frame_graph_pass *pass, const char *name, const frame_graph_resource_desc *desc,
+                                frame_graph_access access, VkClearValue value);
 void frame_graph_read(frame_graph_pass *pass, const char *name, frame_graph_access access);
 void frame_graph_modify(frame_graph_pass *pass, const char *from, const char *to, frame_graph_access access);
-// Reads what `name` held at the end of the last frame. Undefined contents on the first frame and after its desc changed:
-// ask frame_graph_history_valid in execute.
+// Reads what `name` held at the end of the last frame. Undefined contents on the first frame and after its desc
+// changed: ask frame_graph_history_valid in execute.
 void frame_graph_read_previous(frame_graph_pass *pass, const char *name, frame_graph_access access);
 // Keeps `name` after the frame, in the state `after`, for frame_graph_find_*.
 void frame_graph_export(frame_graph *graph, const char *name, frame_graph_access after);
@@ -70,8 +76,9 @@ static inline frame_graph_resource_desc frame_graph_buffer_of(uint64_t size)
 // ---- Run: compile, record, submit and wait. False on a declaration error or a lost device; logged.
 bool frame_graph_execute(frame_graph *graph);
 
-// ---- Within execute callbacks. A name that the pass did not declare is asserted. Where a pass uses a name of this frame
-// and reads last frame's too, this frame's is meant.
+// ---- Within execute callbacks. A name that the pass did not declare is asserted. Where a pass uses a name of this
+// frame and reads last frame's too, this frame's is meant.
+
 // Binds a pipeline with all of the pass's binding uses.
 void frame_graph_bind(const frame_graph_context *context, gpu_pipeline pipeline);
 gpu_buffer frame_graph_buffer(const frame_graph_context *context, const char *name);

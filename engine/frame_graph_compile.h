@@ -1,22 +1,22 @@
 // The pure half of the frame graph: from what passes declare to a plan of plain data (order, culled passes, lifetimes,
 // memory slots, barriers). Touches no GPU object, so that tests read the plan without a device.
 //
-// Names are versions. A resource is created under one name; a modification consumes one name and makes a new one (in the
-// same memory), so every name has exactly one maker, and the order of passes follows from the names alone, never from the
-// order of registration. All readers of a name run before the pass that modifies it.
+// Names are versions. A resource is created under one name; a modification consumes one name and makes a new one (in
+// the same memory), so every name has exactly one maker, and the order of passes follows from the names alone, never
+// from the order of registration. All readers of a name run before the pass that modifies it.
 #pragma once
 
 #include "base.h"
 
 #include <vulkan/vulkan.h>
 
-// How a pass touches a resource. The table in frame_graph_compile.c gives each its stages, access mask, layout, usage
+// How a pass touches a resource. The table in frame_graph_access.c gives each its stages, access mask, layout, usage
 // flags and whether it writes; shader stages follow from the kind of the pass.
 typedef enum frame_graph_access {
     ACCESS_NONE, // imports only: contents undefined (before) or of no further interest (after)
     ACCESS_COLOR_ATTACHMENT,
     ACCESS_DEPTH_ATTACHMENT,
-    ACCESS_DEPTH_TEST,         // depth attachment that is only tested
+    ACCESS_DEPTH_TEST, // depth attachment that is only tested
     ACCESS_DEPTH_TEST_SAMPLED, // tested, and sampled by the shaders of the same pass
     ACCESS_SAMPLED,
     ACCESS_STORAGE_READ,
@@ -28,7 +28,7 @@ typedef enum frame_graph_access {
     ACCESS_TRANSFER_WRITE,
     ACCESS_BUILD_INPUT, // instances for an acceleration structure build
     ACCESS_BUILD_WRITE, // the structure that is built
-    ACCESS_TRACE,       // the structure that is traced
+    ACCESS_TRACE, // the structure that is traced
     ACCESS_HOST_READ,
     ACCESS_HOST_WRITE,
     ACCESS_COUNT
@@ -42,7 +42,8 @@ typedef struct frame_graph_access_info {
     VkImageLayout layout;
     VkFlags image_usage, buffer_usage;
     bool write;
-    bool binding;                        // takes the next binding of set 0
+    bool binding; // takes the next binding of set 0
+    bool attachment;
     uint32_t resource_kinds, pass_kinds; // that may be used so, by such passes: bit per enumerator
 } frame_graph_access_info;
 const frame_graph_access_info *frame_graph_access_describe(frame_graph_access access);
@@ -55,19 +56,23 @@ typedef enum frame_graph_pass_kind {
     FRAME_GRAPH_HOST, // a CPU callback between two submits
 } frame_graph_pass_kind;
 
-typedef enum frame_graph_resource_kind { FRAME_GRAPH_BUFFER, FRAME_GRAPH_IMAGE, FRAME_GRAPH_ACCELERATION } frame_graph_resource_kind;
+typedef enum frame_graph_resource_kind {
+    FRAME_GRAPH_BUFFER,
+    FRAME_GRAPH_IMAGE,
+    FRAME_GRAPH_ACCELERATION
+} frame_graph_resource_kind;
 
 typedef struct frame_graph_resource_desc {
     frame_graph_resource_kind kind;
-    uint64_t size;          // buffer: bytes
-    bool host;              // buffer: in host-visible memory
-    VkFormat format;        // image
+    uint64_t size; // buffer: bytes
+    bool host; // buffer: in host-visible memory
+    VkFormat format; // image
     uint32_t width, height; // image
 } frame_graph_resource_desc;
 
 // One line of a pass's declaration. A pass may use one resource in several ways, what it makes itself included (its own
-// steps, with gpu_memory_barrier between them): the graph waits for all of them before the pass and for all of them after.
-// An image must be in one layout throughout a pass.
+// steps, with gpu_memory_barrier between them): the graph waits for all of them before the pass and for all of them
+// after. An image must be in one layout throughout a pass.
 typedef enum frame_graph_use_kind {
     FRAME_GRAPH_USE_CREATE,
     FRAME_GRAPH_USE_READ,
@@ -82,7 +87,7 @@ typedef struct frame_graph_use {
     const char *name;
     const char *makes; // CREATE and MODIFY: the name made
     frame_graph_resource_desc desc; // CREATE
-    bool clear; // attachments made by CREATE: cleared to `clear_value` at the start; otherwise their contents start undefined
+    bool clear; // attachments made by CREATE: they start as `clear_value`; false: undefined
     VkClearValue clear_value;
 } frame_graph_use;
 
@@ -98,7 +103,7 @@ typedef struct frame_graph_import_decl {
     const char *name;
     frame_graph_resource_desc desc;
     frame_graph_access before; // how it was last used; the import's memory is synchronised against it
-    frame_graph_access after;  // the state to leave it in; ACCESS_NONE: as the last pass left it
+    frame_graph_access after; // the state to leave it in; ACCESS_NONE: as the last pass left it
 } frame_graph_import_decl;
 
 typedef struct frame_graph_export_decl {
@@ -124,7 +129,7 @@ enum { FRAME_GRAPH_NONE = UINT32_MAX };
 // What must be waited for before the next access.
 typedef struct frame_graph_state {
     VkPipelineStageFlags2 stages; // that wrote or read last
-    VkAccessFlags2 mask;          // what was written
+    VkAccessFlags2 mask; // what was written
     VkImageLayout layout;
 } frame_graph_state;
 
@@ -133,24 +138,25 @@ typedef struct frame_graph_plan_resource {
     const char *name; // of its first version
     frame_graph_resource_desc desc;
     VkFlags usage;
-    uint32_t import;      // index, or FRAME_GRAPH_NONE
-    bool history;         // last frame's contents are read: two objects that alternate, outside the slots
+    uint32_t import; // index, or FRAME_GRAPH_NONE
+    bool history; // last frame's contents are read: two objects that alternate, outside the slots
     bool exported;
-    uint32_t slot;        // transient: index of its memory slot; FRAME_GRAPH_NONE otherwise
-    uint32_t first, last; // lifetime: indices into `order`, inclusive; exports last to the end; unused: FRAME_GRAPH_NONE
+    uint32_t slot; // transient: index of its memory slot; FRAME_GRAPH_NONE otherwise
+    // Lifetime: indices into `order`, inclusive; exports last to the end; unused: FRAME_GRAPH_NONE.
+    uint32_t first, last;
     frame_graph_state final; // at the end of the frame, after the final barriers
 } frame_graph_plan_resource;
 
 typedef struct frame_graph_slot {
     VkMemoryRequirements requirements; // the largest of its users
-    frame_graph_resource_kind kind;    // buffers and images never share a slot
+    frame_graph_resource_kind kind; // buffers and images never share a slot
     bool host;
 } frame_graph_slot;
 
 typedef struct frame_graph_barrier {
     uint32_t resource;
-    // Of the resource's other object, last frame's contents. The source of the first one is the resource's `final` state, as
-    // if the last frame had had this plan; whoever executes puts in the state that it recorded, or UNDEFINED.
+    // Of the resource's other object, last frame's contents. The source of the first one is the resource's `final`
+    // state, as if the last frame had had this plan; whoever executes puts in the state that it recorded, or UNDEFINED.
     bool previous;
     VkPipelineStageFlags2 source_stages, destination_stages;
     VkAccessFlags2 source_mask, destination_mask;
@@ -160,6 +166,7 @@ typedef struct frame_graph_barrier {
 // What each use of a pass came to.
 typedef struct frame_graph_plan_use {
     uint32_t resource; // FRAME_GRAPH_NONE: optional and absent
+    const char *name; // READ, MODIFY and PREVIOUS: the alternative that was meant; NULL: absent
     bool previous;
     VkAttachmentLoadOp load; // attachments
     VkAttachmentStoreOp store;
@@ -201,6 +208,10 @@ bool frame_graph_names(const char *alternatives, const char *name);
 // Resource that carries `name` (alternatives allowed) in the plan, or FRAME_GRAPH_NONE.
 uint32_t frame_graph_plan_find(const frame_graph_plan *plan, const frame_graph_input *input, const char *name);
 
-// The plan as text (order with barriers, culled passes with reasons, resources with lifetimes and slots) or as a DOT digraph.
+// The plan as text (order with barriers, culled passes with reasons, resources with lifetimes and slots), or as a
+// DOT digraph.
 char *frame_graph_plan_text(const frame_graph_plan *plan, const frame_graph_input *input, arena *arena);
 char *frame_graph_plan_dot(const frame_graph_plan *plan, const frame_graph_input *input, arena *arena);
+
+// Enumerators in messages and texts: "graphics", "image", "modifies".
+extern const char *const FRAME_GRAPH_PASS_KINDS[], *const FRAME_GRAPH_RESOURCE_KINDS[], *const FRAME_GRAPH_USE_VERBS[];

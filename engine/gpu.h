@@ -28,15 +28,15 @@ typedef struct gpu_acceleration { // a bottom- or top-level acceleration structu
 
 // ---- Device
 typedef struct gpu_desc {
-    const char *device; // picks the first device whose name contains this, without regard to case; NULL: the first usable
-    bool validation;    // validation layer with synchronization validation; creation fails when the layer is not installed
+    const char *device; // picks the first whose name contains this, without regard to case; NULL: the first usable
+    bool validation; // validation layer with synchronization validation; creation fails when the layer is not installed
 } gpu_desc;
 
 // Picks a device that has all that the renderer needs. Returns NULL and names each missing feature when there is none.
 gpu *gpu_create(const gpu_desc *desc);
 void gpu_destroy(gpu *gpu); // waits for the device and destroys what is still alive; accepts NULL
 const char *gpu_name(const gpu *gpu);
-bool gpu_is_cpu(const gpu *gpu);           // lavapipe and the like
+bool gpu_is_cpu(const gpu *gpu); // lavapipe and the like
 bool gpu_has_float_atomics(const gpu *gpu); // buffer float32 atomic add, needed by the paper's scatter only
 uint32_t gpu_validation_messages(const gpu *gpu); // warnings and errors of the validation layer so far; each is logged
 // Prints one line a device to `out` with what it lacks. Returns the number of usable devices.
@@ -79,10 +79,12 @@ gpu_image gpu_image_create(gpu *gpu, const gpu_image_desc *desc);
 void gpu_image_destroy(gpu *gpu, gpu_image image);
 VkImage gpu_image_handle(gpu *gpu, gpu_image image);
 VkImageView gpu_image_view(gpu *gpu, gpu_image image); // all mips
-const gpu_image_desc *gpu_image_info(gpu *gpu, gpu_image image); // `name` and `data` are NULL here, `mips` is at least 1
-// Reads mip 0, tightly packed rows in the image's own format, and waits. `layout` is the layout that it is in, and stays in.
+const gpu_image_desc *gpu_image_info(gpu *gpu, gpu_image image); // `name` and `data` are NULL, `mips` is at least 1
+// Reads mip 0, tightly packed rows in the image's own format, and waits. `layout` is the layout that it is in, and
+// stays in.
 bool gpu_image_read(gpu *gpu, gpu_image image, VkImageLayout layout, void *data, VkDeviceSize size);
 uint32_t gpu_format_size(VkFormat format); // bytes per texel
+VkImageAspectFlags gpu_format_aspect(VkFormat format); // depth or colour; the formats used have no stencil
 
 // Size and alignment of what the desc would need, for placing several resources in one memory.
 VkMemoryRequirements gpu_buffer_requirements(gpu *gpu, const gpu_buffer_desc *desc);
@@ -94,7 +96,8 @@ VkDeviceSize gpu_memory_used(const gpu *gpu); // bytes allocated now
 VkDeviceSize gpu_memory_peak(const gpu *gpu);
 
 // ---- The bindless set (set 1): what every shader may read of the scene. One per gpu; arrays grow by index.
-// Its layout is fixed by `shaders/scene.glsl.h`: storage buffers at bindings 0..GPU_SCENE_BUFFERS-1, then the sampled textures.
+// Its layout is fixed by `shaders/scene.glsl.h`: storage buffers at bindings 0..GPU_SCENE_BUFFERS-1, then the sampled
+// textures.
 enum { GPU_SCENE_BUFFERS = 12, GPU_SCENE_TEXTURES_BINDING = 12, GPU_SCENE_TEXTURES_MAX = 1024 };
 // Both only between a submit and the next gpu_commands_begin (asserted).
 void gpu_scene_bind_buffer(gpu *gpu, uint32_t binding, gpu_buffer buffer);
@@ -117,7 +120,7 @@ typedef struct gpu_shader { // made by engine/shader.h, at build time or at run 
     uint32_t binding_mask; // bit b: set 0 has binding b
     VkDescriptorType binding_types[GPU_BINDINGS_MAX];
     uint32_t push_size; // bytes
-    bool uses_scene;    // touches set 1
+    bool uses_scene; // touches set 1
 } gpu_shader;
 
 typedef struct gpu_compute_pipeline_desc {
@@ -134,8 +137,8 @@ typedef struct gpu_graphics_pipeline_desc {
     uint32_t constant_count;
     VkPrimitiveTopology topology; // 0 is a point list; triangles are VK_PRIMITIVE_TOPOLOGY_TRIANGLE_LIST
     VkCullModeFlags cull;
-    bool cull_dynamic;         // cull mode is set by gpu_cull_set
-    bool clockwise;            // front faces are clockwise in framebuffer coordinates; false: counter-clockwise
+    bool cull_dynamic; // cull mode is set by gpu_cull_set
+    bool clockwise; // front faces are clockwise in framebuffer coordinates; false: counter-clockwise
     bool depth_clamp;
     bool depth_write;
     VkCompareOp depth_compare; // 0 (NEVER) means no depth test
@@ -161,9 +164,11 @@ typedef struct gpu_binding { // at most one member is set; none: this binding is
     gpu_acceleration acceleration;
 } gpu_binding;
 // Binds a pipeline, set 1 where it is used, and the bindings 0..count-1 of set 0. Bindings that the pipeline's shaders
-// do not have are skipped; one that they have and that is not given is asserted. Sampled images get a nearest, clamped sampler.
+// do not have are skipped; one that they have and that is not given is asserted. Sampled images get a nearest, clamped
+// sampler.
 void gpu_bind(gpu_commands *commands, gpu_pipeline pipeline, const gpu_binding *bindings, uint32_t count);
-void gpu_push(gpu_commands *commands, const void *data, uint32_t size); // at least the bound pipeline's block, at most GPU_PUSH_MAX bytes
+// `size` is at least that of the bound pipeline's block and at most GPU_PUSH_MAX bytes.
+void gpu_push(gpu_commands *commands, const void *data, uint32_t size);
 void gpu_dispatch(gpu_commands *commands, uint32_t x, uint32_t y, uint32_t z); // workgroups; any zero: nothing
 void gpu_dispatch_indirect(gpu_commands *commands, gpu_buffer buffer, VkDeviceSize offset);
 void gpu_draw(gpu_commands *commands, uint32_t vertices, uint32_t instances, uint32_t first_instance);
@@ -172,7 +177,8 @@ void gpu_viewport_set(gpu_commands *commands, float x, float y, float width, flo
 void gpu_cull_set(gpu_commands *commands, VkCullModeFlags cull);
 void gpu_buffer_fill(gpu_commands *commands, gpu_buffer buffer, VkDeviceSize offset, VkDeviceSize size, uint32_t value);
 void gpu_buffer_copy(gpu_commands *commands, gpu_buffer from, gpu_buffer to, VkDeviceSize size);
-// Makes all that shaders and transfers wrote visible to the shaders, transfers and indirect reads after it: for the steps inside one pass.
+// Makes all that shaders and transfers wrote visible to the shaders, transfers and indirect reads after it: for the
+// steps inside one pass.
 void gpu_memory_barrier(gpu_commands *commands);
 void gpu_label_begin(gpu_commands *commands, const char *name); // for debuggers
 void gpu_label_end(gpu_commands *commands);
@@ -186,7 +192,7 @@ bool gpu_timestamps_read(gpu *gpu, double *milliseconds, uint32_t count);
 // ---- Acceleration structures (ray query)
 typedef struct gpu_triangles {
     VkDeviceAddress positions; // 3 floats each
-    uint32_t position_stride;  // bytes
+    uint32_t position_stride; // bytes
     uint32_t position_count;
     VkDeviceAddress indices; // 3 uint32_t a triangle, relative to `positions`
     uint32_t triangle_count;

@@ -146,7 +146,6 @@ void gpu_name_set(gpu *gpu, VkObjectType type, uint64_t handle, const char *name
 gpu_buffer gpu_buffer_create_unbound(gpu *gpu, const gpu_buffer_desc *desc);
 gpu_buffer_object *gpu_buffer_get(const gpu *gpu, gpu_buffer buffer);
 gpu_image_object *gpu_image_get(const gpu *gpu, gpu_image image);
-VkImageAspectFlags gpu_format_aspect(VkFormat format);
 VkSampler gpu_sampler_get(gpu *gpu, const gpu_sampler_desc *desc); // null on failure
 
 bool gpu_scene_init(gpu *gpu);

@@ -9,5 +9,6 @@ bool image_write_png(const char *path, const uint8_t *texels, uint32_t width, ui
 // 32-bit float, `channels` 1 ("Y") or 3 ("R G B") interleaved, tightly packed rows from the top. ZIP compressed.
 bool image_write_exr(const char *path, const float *texels, uint32_t width, uint32_t height, uint32_t channels);
 
-// Reads any EXR with the channels R G B (or Y alone) as interleaved RGB floats; free() them. NULL and one logged line on failure.
+// Reads any EXR with the channels R G B (or Y alone) as interleaved RGB floats; free() them. NULL and one logged line
+// on failure.
 float *image_read_exr(const char *path, uint32_t *width, uint32_t *height);

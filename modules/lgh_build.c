@@ -1,5 +1,5 @@
-// Builds the lighting grid hierarchy over `vpls` every frame (Lin and Yuksel 2019, section 3.1; shaders/lgh.glsl.h has the
-// data structure): makes `lgh_header`, `lgh_lights`, `lgh_sums` and, for the `vpl` end points, `lgh_samples`.
+// Builds the lighting grid hierarchy over `vpls` every frame (Lin and Yuksel 2019, section 3.1; shaders/lgh.glsl.h has
+// the data structure): makes `lgh_header`, `lgh_lights`, `lgh_sums` and, for the `vpl` end points, `lgh_samples`.
 // Nothing is read back: the number of levels is chosen on the GPU, and whatever depends on it is dispatched indirectly.
 #include "lgh_build.h"
 #include "modules.h"
@@ -42,7 +42,7 @@ typedef struct lgh_build {
     uint32_t capacity; // grid lights
     uint32_t interleave, levels;
     float alpha;
-    uint32_t key;  // of this frame's random numbers
+    uint32_t key; // of this frame's random numbers
     uint32_t demo; // the emission model `demo` weighs all lights alike
 } lgh_build;
 
@@ -51,7 +51,8 @@ typedef struct lgh_step { // user of the passes that build one level
     uint32_t step; // t: builds S_(t+1)
 } lgh_step;
 
-static void dispatch(const frame_graph_context *context, gpu_pipeline pipeline, const void *push, uint32_t size, uint32_t groups)
+static void dispatch(const frame_graph_context *context, gpu_pipeline pipeline, const void *push, uint32_t size,
+                     uint32_t groups)
 {
     frame_graph_bind(context, pipeline);
     if (size > 0)
@@ -93,7 +94,8 @@ static void execute_sort(const frame_graph_context *context, void *user)
 static void execute_levels(const frame_graph_context *context, void *user)
 {
     const lgh_build *b = user;
-    const gpu_buffer masks = frame_graph_buffer(context, "lgh_masks"), counts = frame_graph_buffer(context, "lgh_counts");
+    const gpu_buffer masks = frame_graph_buffer(context, "lgh_masks"),
+                     counts = frame_graph_buffer(context, "lgh_counts");
     gpu_buffer_fill(context->commands, masks, 0, lgh_mask_words(b->exponent) * 4ull, 0);
     gpu_buffer_fill(context->commands, counts, 0, LGH_EXPONENTS * 4, 0);
     gpu_memory_barrier(context->commands);
@@ -126,15 +128,16 @@ static void execute_compact(const frame_graph_context *context, void *user)
 static void execute_cells(const frame_graph_context *context, void *user)
 {
     const lgh_build *b = user;
-    gpu_buffer_fill(context->commands, frame_graph_buffer(context, "lgh_cell_masks"), 0, lgh_cell_words(b->exponent) * 4ull, 0);
+    gpu_buffer_fill(context->commands, frame_graph_buffer(context, "lgh_cell_masks"), 0,
+                    lgh_cell_words(b->exponent) * 4ull, 0);
     gpu_memory_barrier(context->commands);
     dispatch(context, b->pipelines[CELLS_MARK], &b->exponent, 4, div_up_u32(b->slots, 64));
     rank_bits(context, b, 1, lgh_cell_words(b->exponent));
     dispatch(context, b->pipelines[CELLS], &b->exponent, 4, div_up_u32(b->slots, 64));
 }
 
-static void execute_indirect(const frame_graph_context *context, gpu_pipeline pipeline, const uint32_t *push, uint32_t size,
-                             size_t offset)
+static void execute_indirect(const frame_graph_context *context, gpu_pipeline pipeline, const uint32_t *push,
+                             uint32_t size, size_t offset)
 {
     frame_graph_bind(context, pipeline);
     if (size > 0)
@@ -158,8 +161,9 @@ static const char *sums_name(const lgh_build *b, uint32_t step)
 
 static const char *samples_name(const lgh_build *b, uint32_t step)
 {
-    static const char *const names[] = {"lgh_samples_1", "lgh_samples_2", "lgh_samples_3", "lgh_samples_4", "lgh_samples_5",
-                                        "lgh_samples_6", "lgh_samples_7", "lgh_samples_8", "lgh_samples_9"};
+    static const char *const names[] = {"lgh_samples_1", "lgh_samples_2", "lgh_samples_3",
+                                        "lgh_samples_4", "lgh_samples_5", "lgh_samples_6",
+                                        "lgh_samples_7", "lgh_samples_8", "lgh_samples_9"};
     return step >= b->exponent ? "lgh_samples" : names[step];
 }
 
@@ -212,10 +216,12 @@ static void execute_lights(const frame_graph_context *context, void *user)
 
 // ---- Declarations
 
-static frame_graph_pass *add_pass(renderer *r, const char *name, void (*execute)(const frame_graph_context *, void *), void *user)
+static frame_graph_pass *add_pass(renderer *r, const char *name, void (*execute)(const frame_graph_context *, void *),
+                                  void *user)
 {
     return frame_graph_pass_add(
-        r->graph, &(frame_graph_pass_desc){.name = name, .kind = FRAME_GRAPH_COMPUTE, .execute = execute, .user = user});
+        r->graph,
+        &(frame_graph_pass_desc){.name = name, .kind = FRAME_GRAPH_COMPUTE, .execute = execute, .user = user});
 }
 
 static void create_buffer(frame_graph_pass *p, const char *name, uint64_t size)
@@ -234,7 +240,8 @@ static void declare_bounds(renderer *r, lgh_build *b)
 
 static void declare_sort(renderer *r, lgh_build *b, bool sorted)
 {
-    frame_graph_pass *p = add_pass(r, sorted ? "lgh_build/sort" : "lgh_build/keys", sorted ? execute_sort : execute_keys, b);
+    frame_graph_pass *p =
+        add_pass(r, sorted ? "lgh_build/sort" : "lgh_build/keys", sorted ? execute_sort : execute_keys, b);
     frame_graph_read(p, "vpls", ACCESS_STORAGE_READ);
     frame_graph_read(p, "lgh_bounds", ACCESS_STORAGE_READ);
     create_buffer(p, "lgh_keys", b->slots * 4ull);
@@ -278,8 +285,8 @@ static void declare_cells(renderer *r, lgh_build *b)
 }
 
 // What walks the sorted VPLs around each vertex of S1, and makes `name`.
-static void declare_first(renderer *r, lgh_build *b, const char *pass, void (*execute)(const frame_graph_context *, void *),
-                          const char *name, uint64_t size)
+static void declare_first(renderer *r, lgh_build *b, const char *pass,
+                          void (*execute)(const frame_graph_context *, void *), const char *name, uint64_t size)
 {
     static const char *const inputs[] = {"vpls",           "lgh_header",     "lgh_vertices",   "lgh_order",
                                          "lgh_cell_masks", "lgh_cell_ranks", "lgh_cell_starts"};
@@ -296,11 +303,10 @@ static frame_graph_pass *add_step(renderer *r, lgh_build *b, const char *prefix,
     char name[32];
     snprintf(name, sizeof name, "lgh_build/%s%u", prefix, step + 1);
     lgh_step user = {b, step};
-    return frame_graph_pass_add(r->graph, &(frame_graph_pass_desc){.name = name,
-                                                                   .kind = FRAME_GRAPH_COMPUTE,
-                                                                   .execute = execute,
-                                                                   .user = &user,
-                                                                   .user_size = sizeof user});
+    return frame_graph_pass_add(
+        r->graph,
+        &(frame_graph_pass_desc){
+            .name = name, .kind = FRAME_GRAPH_COMPUTE, .execute = execute, .user = &user, .user_size = sizeof user});
 }
 
 static void declare_scatter(renderer *r, lgh_build *b, uint32_t step)
@@ -355,7 +361,10 @@ static void declare_lights(renderer *r, lgh_build *b)
     frame_graph_read(p, "lgh_header", ACCESS_INDIRECT);
 }
 
-static uint32_t log2_floor(uint32_t x) { return 31u - (uint32_t)__builtin_clz(max_u32(x, 1)); }
+static uint32_t log2_floor(uint32_t x)
+{
+    return 31u - (uint32_t)__builtin_clz(max_u32(x, 1));
+}
 
 static void follow_settings(lgh_build *b, const render_settings *s, uint32_t key)
 {
@@ -378,6 +387,11 @@ static void lgh_build_setup(renderer *r, void *state)
         return;
     lgh_build *b = state;
     const render_settings *s = &r->settings;
+    if (!b->pipelines[SCATTER].id && (s->s1 == LGH_S1_ATOMIC || s->build == LGH_BUILD_SCATTER)) {
+        log_error("%s has no float atomics on buffers, which --s1 atomic and --build scatter need", gpu_name(r->gpu));
+        r->failed = true;
+        return;
+    }
     follow_settings(b, s, s->seed * 0x9e3779b9u + r->frame);
     const bool ordered = s->s1 == LGH_S1_ORDERED && s->build != LGH_BUILD_SCATTER;
     const bool sorted = ordered || s->end_point == END_POINT_VPL;
@@ -390,7 +404,8 @@ static void lgh_build_setup(renderer *r, void *state)
         declare_samples(r, b);
     }
     if (ordered)
-        declare_first(r, b, "lgh_build/s1", execute_first_ordered, sums_name(b, 0), b->capacity * (uint64_t)sizeof(lgh_sums));
+        declare_first(r, b, "lgh_build/s1", execute_first_ordered, sums_name(b, 0),
+                      b->capacity * (uint64_t)sizeof(lgh_sums));
     else
         declare_scatter(r, b, 0);
     for (uint32_t step = 1; step <= b->exponent; step++)
@@ -411,7 +426,10 @@ uint32_t lgh_mask_words(uint32_t exponent)
     return words;
 }
 
-uint32_t lgh_cell_words(uint32_t exponent) { return div_up_u32(1u << 3 * exponent, 32); }
+uint32_t lgh_cell_words(uint32_t exponent)
+{
+    return div_up_u32(1u << 3 * exponent, 32);
+}
 
 uint32_t lgh_capacity(const render_settings *s)
 {

@@ -74,10 +74,12 @@ static void execute_volumes(const frame_graph_context *context, void *user)
         gpu_draw(context->commands, 3, 1, 0);
         break;
     case DRAW_MIDDLE:
-        gpu_draw_indirect(context->commands, frame_graph_buffer(context, "lgh_header"), offsetof(lgh_header, volume_draw));
+        gpu_draw_indirect(context->commands, frame_graph_buffer(context, "lgh_header"),
+                          offsetof(lgh_header, volume_draw));
         break;
     case DRAW_FIRST:
-        gpu_draw_indirect(context->commands, frame_graph_buffer(context, "lgh_header"), offsetof(lgh_header, volume_first_draw));
+        gpu_draw_indirect(context->commands, frame_graph_buffer(context, "lgh_header"),
+                          offsetof(lgh_header, volume_first_draw));
         break;
     case DRAW_VPLS:
         gpu_draw(context->commands, 14, pass->push.slot_count, 0);
@@ -85,7 +87,10 @@ static void execute_volumes(const frame_graph_context *context, void *user)
     }
 }
 
-static uint32_t samples_of(const renderer *r) { return renderer_has_shadows(r) ? r->settings.shadow_samples : 0; }
+static uint32_t samples_of(const renderer *r)
+{
+    return renderer_has_shadows(r) ? r->settings.shadow_samples : 0;
+}
 
 static VkDeviceSize reservoirs_size(const renderer *r)
 {
@@ -104,7 +109,8 @@ static void declare_clear(renderer *r)
                                         .user = &pass,
                                         .user_size = sizeof pass};
     const frame_graph_resource_desc buffer = frame_graph_buffer_of(pass.size);
-    frame_graph_create_resource(frame_graph_pass_add(r->graph, &desc), "reservoirs_empty", &buffer, ACCESS_TRANSFER_WRITE);
+    frame_graph_create_resource(frame_graph_pass_add(r->graph, &desc), "reservoirs_empty", &buffer,
+                                ACCESS_TRANSFER_WRITE);
 }
 
 // Size of the tiled layout: whole tiles (shaders/interleave.glsl.h).
@@ -117,11 +123,10 @@ static frame_graph_resource_desc tiled_image(const render_settings *s, VkFormat 
 static frame_graph_pass *add_pass(renderer *r, const char *name, void (*execute)(const frame_graph_context *, void *),
                                   volume_pass *pass)
 {
-    return frame_graph_pass_add(r->graph, &(frame_graph_pass_desc){.name = name,
-                                                                   .kind = FRAME_GRAPH_GRAPHICS,
-                                                                   .execute = execute,
-                                                                   .user = pass,
-                                                                   .user_size = sizeof *pass});
+    return frame_graph_pass_add(
+        r->graph,
+        &(frame_graph_pass_desc){
+            .name = name, .kind = FRAME_GRAPH_GRAPHICS, .execute = execute, .user = pass, .user_size = sizeof *pass});
 }
 
 static void declare_depth(renderer *r, const light_volume *state)

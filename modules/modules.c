@@ -6,17 +6,17 @@ bool modules_init(renderer *r)
 {
     static bool (*const inits[])(renderer *) = {
         acceleration_init, // top-level acceleration structure over the instances
-        vpl_trace_init,    // light paths by ray query, one virtual point light a bounce
-        lgh_build_init,    // the lighting grid hierarchy over the VPLs
-        gbuffer_init,      // what each pixel sees
+        vpl_trace_init, // light paths by ray query, one virtual point light a bounce
+        lgh_build_init, // the lighting grid hierarchy over the VPLs
+        gbuffer_init, // what each pixel sees
         direct_light_init, // punctual lights and emissive triangles
         light_volume_init, // unshadowed indirect light from the hierarchy, and the shadow samples
-        shadow_init,       // ray-query shadows of the samples
-        interleave_init,   // gathers interleaved tiles
-        svgf_init,         // filters the shadowed and unshadowed estimates alike
-        taa_init,          // steadies their ratio over time
-        composite_init,    // emission + albedo * (direct + indirect * ratio)
-        tonemap_init,      // exposure and tone curve
+        shadow_init, // ray-query shadows of the samples
+        interleave_init, // gathers interleaved tiles
+        svgf_init, // filters the shadowed and unshadowed estimates alike
+        taa_init, // steadies their ratio over time
+        composite_init, // emission + albedo * (direct + indirect * ratio)
+        tonemap_init, // exposure and tone curve
     };
     for (size_t i = 0; i < countof(inits); i++)
         if (!inits[i](r))

@@ -23,12 +23,11 @@
 //   emission           RGBA32F       nits
 //   motion             RG16F         pixels from this frame's position to last frame's
 //   direct             RGBA32F       light of the punctual lights that are shadowed one by one   direct_light
-//   direct_u, direct_s RGBA32F       unshadowed and shadowed estimate of sampled direct light (absent when there is none)
-//   direct_analytic    RGBA32F       its unshadowed light without noise (absent when not known)
-//   indirect           RGBA32F       unshadowed; a: sum of the sampling weights f. Tiled when interleaved  light_volume
-//   lights_per_pixel   R32F          lights with a non-zero blending function; tiled like `indirect`
-//   reservoirs         buffer        shadow samples                                    light_volume
-//   indirect_gathered  RGBA32F       `indirect` over the tiles; absent without interleaving      interleave
+//   direct_u, direct_s RGBA32F       unshadowed and shadowed estimate of sampled direct light (absent when there is
+//   none) direct_analytic    RGBA32F       its unshadowed light without noise (absent when not known) indirect RGBA32F
+//   unshadowed; a: sum of the sampling weights f. Tiled when interleaved  light_volume lights_per_pixel   R32F lights
+//   with a non-zero blending function; tiled like `indirect` reservoirs         buffer        shadow samples
+//   light_volume indirect_gathered  RGBA32F       `indirect` over the tiles; absent without interleaving interleave
 //   shadow_u, shadow_s RGBA32F       unshadowed and shadowed estimate of indirect light          shadow
 //   filter_geometry    RGBA32F       shading normal and view depth, 0 where nothing is; for filters  svgf
 //   X_u_filtered, X_s_filtered       for X = shadow, direct                            svgf
@@ -49,8 +48,8 @@
 
 typedef struct render_camera {
     float eye[3], target[3], up[3]; // world; `up` need not be orthogonal
-    float yfov;                     // radians
-    float near_plane;               // metres, > 0
+    float yfov; // radians
+    float near_plane; // metres, > 0
 } render_camera;
 
 enum { RENDERER_EXPORTS_MAX = 16 };
@@ -61,17 +60,18 @@ typedef struct renderer {
     frame_graph *graph;
     const scene_data *scene;
     render_settings settings; // may be changed between frames
-    render_camera camera;     // may be changed between frames
-    bool count_lights;        // makes `lights_per_pixel`
-    // Names kept beside "radiance" and "display" for frame_graph_find_*, left for transfer reads; "name|-" may be absent.
+    render_camera camera; // may be changed between frames
+    bool count_lights; // makes `lights_per_pixel`
+    // Names kept beside "radiance" and "display" for frame_graph_find_*, left for transfer reads; "name|-" may be
+    // absent.
     const char *exports[RENDERER_EXPORTS_MAX];
     uint32_t export_count;
     frame_constants constants; // of the current frame, as the shaders see them
-    component_type pass;       // render_pass
+    component_type pass; // render_pass
     component_type pass_state; // what renderer_pass_add keeps of a pass, switched on or off
     struct world_gpu *gpu_world; // modules/world.c
-    uint32_t frame;            // number of frames rendered so far
-    bool failed;               // in the current frame; systems set it after logging why
+    uint32_t frame; // number of frames rendered so far
+    bool failed; // in the current frame; systems set it after logging why
 } renderer;
 
 // The renderer keeps references to `gpu` and `scene`, which must outlive it. NULL on failure (logged).
@@ -98,7 +98,7 @@ void *renderer_pass_add(renderer *r, const char *name, size_t state_size, void (
 entity renderer_pass_find(const renderer *r, const char *name); // {0} when there is none
 
 // What several modules need to know of the current frame.
-bool renderer_has_indirect(const renderer *r);  // settings ask for indirect light, and there are VPLs and lights
-bool renderer_has_shadows(const renderer *r);   // indirect light with shadow samples
+bool renderer_has_indirect(const renderer *r); // settings ask for indirect light, and there are VPLs and lights
+bool renderer_has_shadows(const renderer *r); // indirect light with shadow samples
 // b in metres: no light's singularity is closer than this.
 float renderer_singularity(const renderer *r);

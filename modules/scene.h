@@ -38,15 +38,15 @@ typedef struct scene_texture { // what a material's texture_reference.texture co
 
 typedef struct scene_light { // KHR_lights_punctual; the node gives position and direction (-z)
     const char *name;
-    uint32_t type;            // LIGHT_*
-    float color[3];           // linear, times intensity: candela, or lux for directional
+    uint32_t type; // LIGHT_*
+    float color[3]; // linear, times intensity: candela, or lux for directional
     float inner_cone, outer_cone; // radians
 } scene_light;
 
 typedef struct scene_camera {
-    const char *name;   // the node's name when the camera itself has none
+    const char *name; // the node's name when the camera itself has none
     uint32_t node;
-    float yfov;         // radians, vertical; orthographic cameras are read as a perspective one with a warning
+    float yfov; // radians, vertical; orthographic cameras are read as a perspective one with a warning
     float near_plane;
 } scene_camera;
 
@@ -84,15 +84,16 @@ typedef struct scene_data {
 } scene_data;
 
 // Reads a .gltf or .glb with all it refers to. What is broken but can be left out (zero-area triangles, optional
-// extensions, points and lines) is a warning; a file that lies (index past its buffer, cycle in the node tree, positions
-// that are not finite, ...) or lacks something (a buffer, an image that a material uses, an extension that it requires)
-// is refused: NULL, and one logged line naming file and thing. The primitives of a mesh may change their order.
+// extensions, points and lines) is a warning; a file that lies (index past its buffer, cycle in the node tree,
+// positions that are not finite, ...) or lacks something (a buffer, an image that a material uses, an extension that it
+// requires) is refused: NULL, and one logged line naming file and thing. The primitives of a mesh may change their
+// order.
 scene_data *scene_load(const char *path);
 void scene_destroy(scene_data *scene); // accepts NULL
 
 // A part of what scene_load does, for tests and for meshes made at run time: orders triangles by recursive median split
-// (halves of n/2, axis by the surface area heuristic), so that drivers that build BVHs by halving the list as given build
-// good ones. O(n log n); the same on every machine.
+// (halves of n/2, axis by the surface area heuristic), so that drivers that build BVHs by halving the list as given
+// build good ones. O(n log n); the same on every machine.
 void scene_primitive_reorder(uint32_t *indices, uint32_t index_count, const float (*positions)[3]);
 
 // What `lanternfield info` prints.

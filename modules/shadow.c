@@ -1,4 +1,5 @@
-// Ray-query shadows of the reservoirs' samples: makes the pair `shadow_u`, `shadow_s`, and counts the rays in `rays_shadow`.
+// Ray-query shadows of the reservoirs' samples: makes the pair `shadow_u`, `shadow_s`, and counts the rays in
+// `rays_shadow`.
 #include "modules.h"
 
 #include "lanternfield_renderer_shaders.h"
@@ -67,9 +68,9 @@ static void shadow_setup(renderer *r, void *state)
     if (!renderer_has_shadows(r))
         return;
     const render_settings *s = &r->settings;
-    const uint32_t variant = (s->reservoirs == RESERVOIRS_EXACT ? EXACT : 0) |
-                             (s->sampling == SAMPLING_UNIFORM ? UNIFORM : 0) |
-                             (s->end_point == END_POINT_JITTER ? JITTER : 0) | (s->end_point == END_POINT_VPL ? VPL : 0);
+    const uint32_t variant =
+        (s->reservoirs == RESERVOIRS_EXACT ? EXACT : 0) | (s->sampling == SAMPLING_UNIFORM ? UNIFORM : 0) |
+        (s->end_point == END_POINT_JITTER ? JITTER : 0) | (s->end_point == END_POINT_VPL ? VPL : 0);
     shadow_pass pass = {
         .pipeline = pipeline_of(r, state, variant),
         .width = s->width,

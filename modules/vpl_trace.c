@@ -30,7 +30,8 @@ static void vpl_trace_setup(renderer *r, void *state)
     pass->push.slot_count = s->vpls;
     pass->push.bounces = s->bounces;
     frame_graph_pass *p = frame_graph_pass_add(
-        r->graph, &(frame_graph_pass_desc){.name = "vpl_trace", .kind = FRAME_GRAPH_COMPUTE, .execute = vpl_trace_execute, .user = pass});
+        r->graph, &(frame_graph_pass_desc){
+                      .name = "vpl_trace", .kind = FRAME_GRAPH_COMPUTE, .execute = vpl_trace_execute, .user = pass});
     frame_graph_read(p, "tlas", ACCESS_TRACE);
     const frame_graph_resource_desc vpls = frame_graph_buffer_of((uint64_t)s->vpls * sizeof(vpl));
     frame_graph_create_resource(p, "vpls", &vpls, ACCESS_STORAGE_WRITE);
@@ -46,6 +47,7 @@ static void vpl_trace_fini(renderer *r, void *state)
 bool vpl_trace_init(renderer *r)
 {
     vpl_trace *state = renderer_pass_add(r, "vpl_trace", sizeof(vpl_trace), vpl_trace_setup, vpl_trace_fini);
-    state->pipeline = gpu_compute_pipeline_create(r->gpu, &(gpu_compute_pipeline_desc){.shader = &shader_vpl_trace_comp});
+    state->pipeline =
+        gpu_compute_pipeline_create(r->gpu, &(gpu_compute_pipeline_desc){.shader = &shader_vpl_trace_comp});
     return state->pipeline.id != 0;
 }

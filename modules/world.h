@@ -6,21 +6,21 @@
 
 // Components. An engine adds, changes and removes them while running; the next frame follows.
 typedef struct node_component { // local transform and parent; "node"
-    entity parent;              // {0}: the world
-    float matrix[16];           // local to parent, column-major
+    entity parent; // {0}: the world
+    float matrix[16]; // local to parent, column-major
     const char *name;
 } node_component;
 typedef struct transform_component { // "transform": filled by the world from node_component
     float world[16];
     float previous_world[16]; // last frame's
-    uint32_t stamp;           // frame of the last update, plus one; 0: never
+    uint32_t stamp; // frame of the last update, plus one; 0: never
 } transform_component;
 typedef struct mesh_component { // "mesh"
-    uint32_t mesh;              // index into scene_data.meshes
+    uint32_t mesh; // index into scene_data.meshes
 } mesh_component;
 typedef struct light_component { // "light": a punctual light at the entity's transform, shining along -z
-    uint32_t type;               // LIGHT_*
-    float color[3];              // candela, or lux for directional
+    uint32_t type; // LIGHT_*
+    float color[3]; // candela, or lux for directional
     float inner_cone, outer_cone; // radians
 } light_component;
 
@@ -38,20 +38,20 @@ typedef struct world_gpu {
     component_type node, transform, mesh, light;
     gpu_buffer frame, positions, attributes, indices, primitives, instances, materials, lights, emitters, light_cdf;
     gpu_buffer tlas_instances; // VkAccelerationStructureInstanceKHR[instance_count], host
-    gpu_acceleration *blas;    // per mesh; {0} for meshes without triangles
+    gpu_acceleration *blas; // per mesh; {0} for meshes without triangles
     uint32_t blas_count;
     gpu_image *textures; // one per image and colour space
     uint32_t texture_count;
     uint32_t instance_count; // this frame's
-    uint32_t instance_max;   // for which there is room in the buffers; grows
+    uint32_t instance_max; // for which there is room in the buffers; grows
     float light_power; // of all sources: luminous flux in lumen-like units (watts of luminance); 0: no light at all
 
     // What the CPU knows of the scene. Instances are ordered by recursive median split over their centres, for drivers
     // that build BVHs by halving the list as given; the order changes only when meshes come or go.
-    box *primitive_boxes;             // mesh space, per primitive
-    world_instance *order;            // instance_count, in the order of the TLAS
+    box *primitive_boxes; // mesh space, per primitive
+    world_instance *order; // instance_count, in the order of the TLAS
     mesh_instance_gpu *instance_data; // the same order
-    struct world_state *state;        // private to world.c
+    struct world_state *state; // private to world.c
     struct world_lights *light_state; // private to world_lights.c
 } world_gpu;
 
@@ -64,8 +64,8 @@ entity world_sun_add(renderer *r, const float direction[3], float lux);
 
 // ---- Between the world's files.
 bool world_upload(renderer *r); // world_upload.c: what never changes
-// world_lights.c: punctual lights, emissive triangles and the choice among them. Emitters are gathered anew when `moved`,
-// that is when an instance with an emissive material moved, came or went.
+// world_lights.c: punctual lights, emissive triangles and the choice among them. Emitters are gathered anew when
+// `moved`, that is when an instance with an emissive material moved, came or went.
 bool world_lights_init(renderer *r);
 bool world_lights_extract(renderer *r, bool moved);
 void world_lights_fini(renderer *r);

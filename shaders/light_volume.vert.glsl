@@ -72,7 +72,8 @@ void main()
     float radius = radius_of(v.c);
     float factor = v.dealt ? float(push.interleave * push.interleave) : 1.0;
     light_position = vec4(light.position, radius);
-    light_color = vec4(light.color * factor, 0.0);
+    light_color = light.color * factor;
+    light_spread = grid_spread(push.emission, light);
     light_normal = light.normal;
     light_diagonal = light.moment_diagonal;
     light_mixed = light.moment_mixed;

@@ -73,11 +73,10 @@ shadow_sample grid_sample(uint index, gbuffer_point p, uint random)
     uint lowest = push.start_level == 0u ? header.level_count : header.level_count - 1u;
     float scale = lgh_blend(blend_kind(c, lowest), distance(light.position, p.position), header.levels[c].radius);
     scale *= dealt_factor(header.levels[c].occupied);
-    vec3 v;
-    float received = receive(light.position, p.position, p.geometric, p.shading, push.singularity, v);
+    vec3 sent = grid_light_sent(light, light.position, push.emission, p.position, p.geometric, p.shading, push.singularity);
     shadow_sample s;
-    s.centre_light = light.color * (scale * received * grid_emission(push.emission, light, v));
-    s.end_light = scale * end_point_light(light, index, s.centre_light / max(scale, 1e-30), p, random, s.end);
+    s.centre_light = scale * sent;
+    s.end_light = scale * end_point_light(light, index, sent, p, random, s.end);
     return s;
 }
 

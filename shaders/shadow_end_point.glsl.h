@@ -33,9 +33,7 @@ vec3 end_point_light(grid_light light, uint index, vec3 centre_light, gbuffer_po
     if (!JITTER)
         return centre_light;
     end = jittered(light, random);
-    vec3 v;
-    float received = receive(end, p.position, p.geometric, p.shading, push.singularity, v);
-    return light.color * (received * grid_emission(push.emission, light, v));
+    return grid_light_sent(light, end, push.emission, p.position, p.geometric, p.shading, push.singularity);
 }
 
 #endif

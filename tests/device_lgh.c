@@ -41,9 +41,10 @@ static void brute_force_setup(renderer *r, void *state)
     pass->height = r->settings.height;
     pass->push.slot_count = r->settings.vpls;
     pass->push.singularity = renderer_singularity(r);
-    frame_graph_pass *p = frame_graph_pass_add(
-        r->graph, &(frame_graph_pass_desc){
-                      .name = "brute_force", .kind = FRAME_GRAPH_COMPUTE, .execute = brute_force_execute, .user = pass});
+    frame_graph_pass *p = frame_graph_pass_add(r->graph, &(frame_graph_pass_desc){.name = "brute_force",
+                                                                                  .kind = FRAME_GRAPH_COMPUTE,
+                                                                                  .execute = brute_force_execute,
+                                                                                  .user = pass});
     const frame_graph_resource_desc image =
         frame_graph_image_of(VK_FORMAT_R32G32B32A32_SFLOAT, pass->width, pass->height);
     frame_graph_read(p, "vpls", ACCESS_STORAGE_READ);
@@ -113,7 +114,9 @@ static fixture fixture_create(const char *path, const char *camera, const render
         printf("cannot set up %s\n", path);
         exit(EXIT_FAILURE);
     }
-    f.r->camera = renderer_camera_of_scene(f.r, camera ? scene_camera_find(f.scene, camera) : f.scene->camera_count ? 0 : SCENE_NONE);
+    f.r->camera = renderer_camera_of_scene(f.r, camera                  ? scene_camera_find(f.scene, camera)
+                                                : f.scene->camera_count ? 0
+                                                                        : SCENE_NONE);
     return f;
 }
 
@@ -225,8 +228,10 @@ static comparison compare_with_brute_force(renderer *r, const float *reference)
 TEST(blending_functions_sum_to_one)
 {
     enum { COUNT = 4096 };
-    gpu_pipeline pipeline = gpu_compute_pipeline_create(device, &(gpu_compute_pipeline_desc){.shader = &shader_lgh_blend_sum_comp});
-    gpu_buffer buffer = gpu_buffer_create(device, &(gpu_buffer_desc){.size = COUNT * 4, .usage = VK_BUFFER_USAGE_STORAGE_BUFFER_BIT});
+    gpu_pipeline pipeline =
+        gpu_compute_pipeline_create(device, &(gpu_compute_pipeline_desc){.shader = &shader_lgh_blend_sum_comp});
+    gpu_buffer buffer =
+        gpu_buffer_create(device, &(gpu_buffer_desc){.size = COUNT * 4, .usage = VK_BUFFER_USAGE_STORAGE_BUFFER_BIT});
     static const float alphas[] = {0.5f, 1, 1.7f, 4};
     double worst = 0;
     for (uint32_t levels = 1; levels <= LGH_EXPONENTS; levels++)
@@ -441,7 +446,8 @@ TEST(exact_reservoirs_pick_light_i_with_probability_f_i)
     s.sample_s1 = true;
     fixture f = fixture_create(SCENES "cornell.glb", NULL, &s);
     selection *pass = renderer_pass_add(f.r, "selection", sizeof *pass, selection_setup, pipeline_fini);
-    pass->pipeline = gpu_compute_pipeline_create(device, &(gpu_compute_pipeline_desc){.shader = &shader_selection_comp});
+    pass->pipeline =
+        gpu_compute_pipeline_create(device, &(gpu_compute_pipeline_desc){.shader = &shader_selection_comp});
     export_names(f.r, (const char *const[]){"selection_weights", "reservoirs", "lgh_header"}, 3);
     double picked[SELECTION_LIGHTS] = {0}, expected[SELECTION_LIGHTS] = {0}, variance[SELECTION_LIGHTS] = {0};
     for (int frame = 0; frame < 8; frame++) {
@@ -511,7 +517,8 @@ TEST(a_thin_wall_keeps_the_light_out)
     static const char *const names[] = {"centre", "jitter", "vpl"};
     for (uint32_t end = END_POINT_CENTRE; end <= END_POINT_VPL; end++) {
         const double lit = mean_radiance("lit", end), unlit = mean_radiance("unlit", end);
-        printf("  %s: %.3g nits in the lit room, %.3g in the unlit one: %.3f %%\n", names[end], lit, unlit, 100 * unlit / lit);
+        printf("  %s: %.3g nits in the lit room, %.3g in the unlit one: %.3f %%\n", names[end], lit, unlit,
+               100 * unlit / lit);
         CHECK(lit > 0);
         if (end == END_POINT_CENTRE)
             CHECK(unlit < 0.01 * lit);
@@ -607,6 +614,7 @@ static int print_table(const char *path, const char *camera, uint32_t vpls)
 static comparison compare_shadows(renderer *r, const float *reference, uint32_t frames)
 {
     export_names(r, (const char *const[]){"radiance", "albedo"}, 2);
+    frame_graph_history_drop(r->graph); // of other settings
     for (uint32_t i = 0; i < frames; i++)
         CHECK(renderer_frame(r));
     float *image = read_image(r, "radiance");
@@ -632,7 +640,9 @@ static int print_shadows(const char *path, const char *camera, uint32_t vpls)
     s.only = ONLY_INDIRECT;
     fixture f = fixture_create(path, camera, &s);
     float *reference = brute_force_render(f.r, &shader_brute_force_shadowed_comp);
-    printf("| %s, %u slots | alpha 1, k 1 | alpha 1, k 4 | alpha 2, k 4 | alpha 2, k 4, S1 too |\n|---|---|---|---|---|\n", path, vpls);
+    printf(
+        "| %s, %u slots | alpha 1, k 1 | alpha 1, k 4 | alpha 2, k 4 | alpha 2, k 4, S1 too |\n|---|---|---|---|---|\n",
+        path, vpls);
     for (uint32_t end = 0; end < countof(names); end++) {
         printf("| %s |", names[end]);
         for (uint32_t i = 0; i < 4; i++) {
@@ -653,14 +663,16 @@ static int print_shadows(const char *path, const char *camera, uint32_t vpls)
 
 int main(int argc, char **argv)
 {
-    const bool table = argc >= 3 && strcmp(argv[1], "table") == 0, shadows = argc >= 3 && strcmp(argv[1], "shadows") == 0;
+    const bool table = argc >= 3 && strcmp(argv[1], "table") == 0,
+               shadows = argc >= 3 && strcmp(argv[1], "shadows") == 0;
     device = gpu_create(&(gpu_desc){.validation = !table && !shadows});
     if (!device) {
         printf("skipped: no usable device\n");
         return 77;
     }
     if (table || shadows)
-        return (table ? print_table : print_shadows)(argv[2], argc > 3 ? argv[3] : NULL, argc > 4 ? (uint32_t)atoi(argv[4]) : 100000);
+        return (table ? print_table : print_shadows)(argv[2], argc > 3 ? argv[3] : NULL,
+                                                     argc > 4 ? (uint32_t)atoi(argv[4]) : 100000);
     RUN(blending_functions_sum_to_one);
     RUN(every_level_carries_the_flux_of_the_vpls);
     RUN(other_ways_to_build_carry_the_flux_too);

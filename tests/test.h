@@ -15,11 +15,14 @@ static int test_failures, test_count;
 #define RUN(name) (test_count++, printf("%s\n", #name), fflush(stdout), test_##name())
 
 // Failed checks are counted and the test goes on.
-#define CHECK(condition) ((condition) ? (void)0 : (void)(test_failures++, printf("%s:%d: failed: %s\n", __FILE__, __LINE__, #condition)))
-#define CHECK_NEAR(actual, expected, tolerance) test_check_near(__FILE__, __LINE__, #actual, (actual), (expected), (tolerance))
+#define CHECK(condition)                                                                                               \
+    ((condition) ? (void)0 : (void)(test_failures++, printf("%s:%d: failed: %s\n", __FILE__, __LINE__, #condition)))
+#define CHECK_NEAR(actual, expected, tolerance)                                                                        \
+    test_check_near(__FILE__, __LINE__, #actual, (actual), (expected), (tolerance))
 #define CHECK_STRING(actual, expected) test_check_string(__FILE__, __LINE__, (actual), (expected))
 
-static inline void test_check_near(const char *file, int line, const char *what, double actual, double expected, double tolerance)
+static inline void test_check_near(const char *file, int line, const char *what, double actual, double expected,
+                                   double tolerance)
 {
     if (!(fabs(actual - expected) <= tolerance)) {
         test_failures++;

@@ -26,9 +26,7 @@ void main()
             grid_light g = grid_lights[i];
             uint c = light_exponent(header, i);
             float blend = lgh_blend(blend_kind(c, header.level_count - 1u), distance(g.position, p.position), header.levels[c].radius);
-            vec3 v;
-            float received = receive(g.position, p.position, p.geometric, p.shading, push.singularity, v);
-            f = luminance(g.color * (blend * received * grid_emission(push.emission, g, v)));
+            f = luminance(blend * grid_light_sent(g, g.position, push.emission, p.position, p.geometric, p.shading, push.singularity));
         }
         weights[pixel * push.light_capacity + i] = f;
     }
