@@ -119,7 +119,7 @@ scene_light light_read(importer &in, const tinygltf::Light &light, const std::st
     for (size_t i = 0; i < 3; i++) {
         const double value = light.intensity * (light.color.empty() ? 1.0 : light.color[i]);
         if (!(value >= 0 && value < 1e30)) {
-            fail("%s: color times intensity is %g, expected 0 or more", where.c_str(), value);
+            fail("%s: color times intensity is %g, expected 0 to 1e30", where.c_str(), value);
         }
         result.color[i] = static_cast<float>(value);
     }

@@ -22,6 +22,7 @@ typedef enum lgh_pipeline {
     RANKS_SUM,
     RANKS,
     VERTICES,
+    CELLS_CLEAR,
     CELLS_MARK,
     CELLS,
     FIRST_ORDERED,
@@ -108,34 +109,6 @@ static void execute_levels(const frame_graph_context *context, void *user)
     dispatch(context, b->pipelines[LEVELS], &levels, sizeof levels, 1);
 }
 
-// Ranks of the vertex masks (`cells` 0) or of the cell masks. `words` bounds the words on the CPU's side.
-static void rank_bits(const frame_graph_context *context, const lgh_build *b, uint32_t cells, uint32_t words)
-{
-    const uint32_t groups = div_up_u32(words, LGH_SCAN_WORDS);
-    dispatch(context, b->pipelines[RANKS_SUM], &cells, sizeof cells, groups);
-    dispatch(context, b->pipelines[SCAN], &groups, sizeof groups, 1);
-    dispatch(context, b->pipelines[RANKS], &cells, sizeof cells, groups);
-}
-
-static void execute_compact(const frame_graph_context *context, void *user)
-{
-    const lgh_build *b = user;
-    const uint32_t words = lgh_mask_words(b->exponent);
-    rank_bits(context, b, 0, words);
-    dispatch(context, b->pipelines[VERTICES], NULL, 0, div_up_u32(words, 256));
-}
-
-static void execute_cells(const frame_graph_context *context, void *user)
-{
-    const lgh_build *b = user;
-    gpu_buffer_fill(context->commands, frame_graph_buffer(context, "lgh_cell_masks"), 0,
-                    lgh_cell_words(b->exponent) * 4ull, 0);
-    gpu_memory_barrier(context->commands);
-    dispatch(context, b->pipelines[CELLS_MARK], &b->exponent, 4, div_up_u32(b->slots, 64));
-    rank_bits(context, b, 1, lgh_cell_words(b->exponent));
-    dispatch(context, b->pipelines[CELLS], &b->exponent, 4, div_up_u32(b->slots, 64));
-}
-
 static void execute_indirect(const frame_graph_context *context, gpu_pipeline pipeline, const uint32_t *push,
                              uint32_t size, size_t offset)
 {
@@ -143,6 +116,36 @@ static void execute_indirect(const frame_graph_context *context, gpu_pipeline pi
     if (size > 0)
         gpu_push(context->commands, push, size);
     gpu_dispatch_indirect(context->commands, frame_graph_buffer(context, "lgh_header"), offset);
+}
+
+// Ranks of the vertex masks (`cells` 0) or of the cell masks (1).
+static void rank_bits(const frame_graph_context *context, const lgh_build *b, uint32_t cells, uint32_t most_words)
+{
+    const uint32_t groups = div_up_u32(most_words, LGH_SCAN_WORDS);
+    const size_t scan = offsetof(lgh_header, scan_dispatch) + cells * sizeof(lgh_dispatch);
+    execute_indirect(context, b->pipelines[RANKS_SUM], &cells, sizeof cells, scan);
+    gpu_memory_barrier(context->commands);
+    // Past the groups that were summed the numbers mean nothing, and are not used.
+    dispatch(context, b->pipelines[SCAN], &groups, sizeof groups, 1);
+    execute_indirect(context, b->pipelines[RANKS], &cells, sizeof cells, scan);
+    gpu_memory_barrier(context->commands);
+}
+
+static void execute_compact(const frame_graph_context *context, void *user)
+{
+    const lgh_build *b = user;
+    rank_bits(context, b, 0, lgh_mask_words(b->exponent));
+    execute_indirect(context, b->pipelines[VERTICES], NULL, 0, offsetof(lgh_header, word_dispatch[0]));
+}
+
+static void execute_cells(const frame_graph_context *context, void *user)
+{
+    const lgh_build *b = user;
+    execute_indirect(context, b->pipelines[CELLS_CLEAR], NULL, 0, offsetof(lgh_header, word_dispatch[1]));
+    gpu_memory_barrier(context->commands);
+    dispatch(context, b->pipelines[CELLS_MARK], &b->exponent, 4, div_up_u32(b->slots, 64));
+    rank_bits(context, b, 1, lgh_cell_words(b->exponent));
+    dispatch(context, b->pipelines[CELLS], &b->exponent, 4, div_up_u32(b->slots, 64));
 }
 
 static void execute_first_ordered(const frame_graph_context *context, void *user)
@@ -270,6 +273,7 @@ static void declare_compact(renderer *r, lgh_build *b)
     create_buffer(p, "lgh_ranks", words * 4ull);
     create_buffer(p, "lgh_rank_groups", div_up_u32(words, LGH_SCAN_WORDS) * 4ull);
     create_buffer(p, "lgh_vertices", b->capacity * 4ull);
+    frame_graph_read(p, "lgh_header", ACCESS_INDIRECT);
 }
 
 static void declare_cells(renderer *r, lgh_build *b)
@@ -282,6 +286,7 @@ static void declare_cells(renderer *r, lgh_build *b)
     create_buffer(p, "lgh_cell_groups", div_up_u32(words, LGH_SCAN_WORDS) * 4ull);
     frame_graph_read(p, "lgh_keys", ACCESS_STORAGE_READ);
     create_buffer(p, "lgh_cell_starts", (b->slots + 1) * 4ull);
+    frame_graph_read(p, "lgh_header", ACCESS_INDIRECT);
 }
 
 // What walks the sorted VPLs around each vertex of S1, and makes `name`.
@@ -369,8 +374,9 @@ static uint32_t log2_floor(uint32_t x)
 static void follow_settings(lgh_build *b, const render_settings *s, uint32_t key)
 {
     b->slots = s->vpls;
-    // Surfaces fill at least about cells^2 vertices, so finer grids than sqrt(N) cells never have fewer than N / 2.
-    b->exponent = min_u32(max_u32(log2_floor(s->vpls) / 2, 2), LGH_EXPONENTS - 1);
+    // In a room the lights' surfaces fill several times cells^2 vertices, so sqrt(N) / 4 cells would do; halls, lines and
+    // spot-lit patches stay below N / 2 on finer grids. A grid too fine for any of them only costs its masks.
+    b->exponent = min_u32(log2_floor(s->vpls) / 2 + 2, LGH_EXPONENTS - 1);
     if (s->levels > 0)
         b->exponent = min_u32(max_u32(s->levels - 1, 1), LGH_EXPONENTS - 1);
     b->capacity = lgh_capacity(s);
@@ -434,7 +440,7 @@ uint32_t lgh_cell_words(uint32_t exponent)
 uint32_t lgh_capacity(const render_settings *s)
 {
     const uint32_t largest = (128u << 20) / sizeof(grid_light); // one binding's range
-    const uint64_t asked = s->levels > 0 ? 8ull * s->vpls : s->vpls;
+    const uint64_t asked = s->levels > 0 ? 8ull * s->vpls * s->levels : s->vpls;
     return (uint32_t)(asked < 4096 ? 4096 : asked > largest ? largest : asked);
 }
 
@@ -459,6 +465,7 @@ bool lgh_build_init(renderer *r)
         [RANKS_SUM] = &shader_lgh_build_ranks_sum_comp,
         [RANKS] = &shader_lgh_build_ranks_comp,
         [VERTICES] = &shader_lgh_build_vertices_comp,
+        [CELLS_CLEAR] = &shader_lgh_build_cells_clear_comp,
         [CELLS_MARK] = &shader_lgh_build_cells_mark_comp,
         [CELLS] = &shader_lgh_build_cells_comp,
         [FIRST_ORDERED] = &shader_lgh_build_first_ordered_comp,

@@ -23,11 +23,12 @@
 //   emission           RGBA32F       nits
 //   motion             RG16F         pixels from this frame's position to last frame's
 //   direct             RGBA32F       light of the punctual lights that are shadowed one by one   direct_light
-//   direct_u, direct_s RGBA32F       unshadowed and shadowed estimate of sampled direct light (absent when there is
-//   none) direct_analytic    RGBA32F       its unshadowed light without noise (absent when not known) indirect RGBA32F
-//   unshadowed; a: sum of the sampling weights f. Tiled when interleaved  light_volume lights_per_pixel   R32F lights
-//   with a non-zero blending function; tiled like `indirect` reservoirs         buffer        shadow samples
-//   light_volume indirect_gathered  RGBA32F       `indirect` over the tiles; absent without interleaving interleave
+//   direct_u, direct_s RGBA32F       unshadowed and shadowed estimate of sampled direct light, where there is any
+//   direct_analytic    RGBA32F       its unshadowed light without noise, where that is known
+//   indirect           RGBA32F       unshadowed; a: sum of the weights f; tiled when interleaved         light_volume
+//   lights_per_pixel   R32F          lights with a non-zero blending function; tiled like `indirect`
+//   reservoirs         buffer        shadow samples
+//   indirect_gathered  RGBA32F       `indirect` over the tiles; only when interleaved                    interleave
 //   shadow_u, shadow_s RGBA32F       unshadowed and shadowed estimate of indirect light          shadow
 //   filter_geometry    RGBA32F       shading normal and view depth, 0 where nothing is; for filters  svgf
 //   X_u_filtered, X_s_filtered       for X = shadow, direct                            svgf

@@ -13,7 +13,7 @@ typedef enum sampling_method { SAMPLING_IMPORTANCE, SAMPLING_UNIFORM } sampling_
 
 typedef struct render_settings {
     uint32_t width, height; // pixels
-    uint32_t vpls; // slots, 0 to 4,000,000
+    uint32_t vpls; // slots, 0 to 2,500,000
     uint32_t bounces; // indirect bounces, 1 to 8
     float alpha; // r_l = alpha * h_l; > 0
     uint32_t levels; // 0: automatic

@@ -315,7 +315,8 @@ bool world_lights_extract(renderer *r, bool moved)
         (count == 0 || memcmp(state->light_powers, state->last_light_powers, size) == 0))
         return true;
     memory_reserve((void **)&state->last_light_powers, &state->last_light_capacity, count, sizeof(float));
-    memcpy(state->last_light_powers, state->light_powers, size);
+    if (count > 0)
+        memcpy(state->last_light_powers, state->light_powers, size);
     return distribution_write(r);
 }
 

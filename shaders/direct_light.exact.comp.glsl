@@ -21,7 +21,7 @@ vec3 shade(gbuffer_point point, inout uint rays)
         if (luminance(a.light) <= 0.0)
             continue;
         rays++;
-        // Shortened, since lamps are modelled around their lights.
+        // Shortened by what rounding may add at the far end.
         if (ray_visible(origin, a.direction, 0.9999 * a.distance))
             sum += a.light;
     }

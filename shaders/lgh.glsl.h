@@ -1,7 +1,8 @@
 // The lighting grid hierarchy's geometry: grids, vertex masks and ranks, and the order of the merged grid lights.
 //
 // Exponent c has 2^c cells along each axis and 2^c + 1 vertices. Which vertices hold light is a bit mask per exponent
-// (`lgh_masks`), stored in blocks of 8^3 vertices, Morton order inside a block, blocks in raster order, exponents 0, 1, ...
+// (`lgh_masks`), stored in blocks of 8^3 vertices, Morton order inside a block, blocks in raster order (near enough to a
+// Morton curve for dealing lights to interleaved tiles, without its powers of two), exponents 0, 1, ...
 // one after the other. `lgh_ranks` counts the bits before each word over the whole array, so a vertex's rank is at once
 // its place in the merged arrays (`lgh_vertices`, `lgh_sums`, `lgh_lights`): the top level first, S1 last.
 #ifndef LGH_GLSL_H
@@ -57,6 +58,9 @@ uvec3 mask_vertex(uint c, uint bit)
     uint block = bit >> 9;
     return uvec3(block % blocks, block / blocks % blocks, block / (blocks * blocks)) * 8u + morton_decode(bit & 511u);
 }
+
+// Words of the mask of exponent c's cells, by Morton code.
+uint cell_words(uint c) { return ((1u << 3u * c) + 31u) / 32u; }
 
 // Position on the grid of exponent c, in cells: in [0, 2^c). Powers of two scale exactly, so the cells of all exponents nest.
 vec3 grid_position(vec3 position, vec3 origin, float top_size, uint c)

@@ -4,15 +4,10 @@
 #extension GL_GOOGLE_include_directive : require
 #include "lgh_sums.glsl.h"
 
-layout(local_size_x = 64) in;
-layout(set = 0, binding = 0, scalar) readonly buffer header_block { lgh_header header; };
-layout(set = 0, binding = 1, scalar) readonly buffer vertices_block { uint vertices[]; };
-layout(set = 0, binding = 2, scalar) readonly buffer masks_block { uint masks[]; };
-layout(set = 0, binding = 3, scalar) readonly buffer ranks_block { uint ranks[]; };
-layout(set = 0, binding = 4, scalar) buffer sums_block { lgh_sums sums[]; };
 layout(push_constant, scalar) uniform push_block { uint step; } push;
+#include "lgh_build.coarse.glsl.h"
 
-#include "lgh_lookup.glsl.h"
+layout(set = 0, binding = 4, scalar) buffer sums_block { lgh_sums sums[]; };
 
 shared lgh_sums group_sums[64];
 
@@ -29,22 +24,15 @@ void add_first(inout lgh_sums s, uint fine, ivec3 offset, float fine_size, float
 
 void main()
 {
-    uint i = gl_WorkGroupID.y * 65535u + gl_WorkGroupID.x;
-    if (push.step >= header.level_count)
+    uint c, place, first = header.level_count - 1u;
+    if (!coarse_vertex(gl_WorkGroupID.y * 65535u + gl_WorkGroupID.x, c, place))
         return;
-    uint c = header.level_count - 1u - push.step, first = header.level_count - 1u;
-    if (i >= header.levels[c].occupied)
-        return;
-    uint place = header.levels[c].first_light + i;
     int scale = 1 << push.step, width = 2 * scale + 1;
     ivec3 centre = scale * ivec3(unpack_vertex(vertices[place]));
     lgh_sums s = sums_zero();
     for (int j = int(gl_LocalInvocationIndex); j < width * width * width; j += 64) {
         ivec3 offset = ivec3(j % width, j / width % width, j / (width * width)) - scale;
-        ivec3 v = centre + offset;
-        if (any(lessThan(v, ivec3(0))) || any(greaterThan(v, ivec3(1 << first))))
-            continue;
-        uint fine = lookup(first, uvec3(v));
+        uint fine = place_of(first, centre + offset);
         if (fine != LGH_NONE)
             add_first(s, fine, offset, header.levels[first].cell_size, header.levels[c].cell_size);
     }

@@ -63,6 +63,11 @@ void main()
     header.level_count = levels;
     header.light_count = first;
     header.word_count = LGH_MASK_OFFSET[levels];
+    uint words[2] = uint[](header.word_count, levels > 0u ? cell_words(levels - 1u) : 0u);
+    for (uint i = 0u; i < 2u; i++) {
+        header.word_dispatch[i] = dispatch_of((words[i] + 255u) / 256u);
+        header.scan_dispatch[i] = dispatch_of((words[i] + LGH_SCAN_WORDS - 1u) / LGH_SCAN_WORDS);
+    }
     header.light_dispatch = dispatch_of((first + 63u) / 64u);
     header.first_dispatch = dispatch_of(levels > 0u ? (counts[levels - 1u] + 63u) / 64u : 0u);
     uint instances = 0u;

@@ -19,7 +19,9 @@ void main()
     float scale = s.weight > 0.0 ? 1.0 / s.weight : 0.0; // a vertex on whose plane all its lights' weights vanish
     vec3 mean = s.position * scale;
     vec3 vertex = header.origin + vec3(unpack_vertex(vertices[i])) * header.levels[c].cell_size;
-    vec3 variance = max(vec3(0.0), s.square * scale - mean * mean);
+    // Of lights in a plane, rounding would leave a deviation along its normal, and end points behind it.
+    vec3 square = s.square * scale, variance = square - mean * mean;
+    variance = mix(vec3(0.0), variance, greaterThan(variance, 1e-5 * square));
     lights[i] = grid_light(vertex + mean, luminance(s.color), s.color, vertices[i], sqrt(variance), s.normal * scale,
                            s.moment_diagonal * scale, s.moment_mixed * scale);
 }

@@ -17,7 +17,7 @@ uint word_count()
 {
     if (push.cells == 0u)
         return header.word_count;
-    return header.level_count == 0u ? 0u : ((1u << 3u * (header.level_count - 1u)) + 31u) / 32u;
+    return header.level_count == 0u ? 0u : cell_words(header.level_count - 1u);
 }
 
 uint run_first() { return gl_WorkGroupID.x * LGH_SCAN_WORDS + gl_LocalInvocationIndex * RUN; }

@@ -38,9 +38,9 @@ float grid_emission(uint model, grid_light light, vec3 v)
     return model == EMISSION_A ? a : model == EMISSION_B ? b : 0.5 * (a + b);
 }
 
-// A grid light is no nearer than its own spread: the square of its VPLs' standard deviation in
-// the models A, B and AB. Without it the one point in their midst glares where they would light the surface evenly:
-// measured, relative L2 in the atrium at alpha 1 / 2: 0.28 / 0.20 without, 0.23 / 0.14 with. The authors' models go without.
+// A grid light is no nearer than its own spread, the square of its VPLs' standard deviation, in the models A, B and AB.
+// Without it the one point in their midst glares where they would light the surface evenly: measured, relative L2 in the
+// atrium at alpha 1 and 2, 0.28 and 0.20 without, 0.23 and 0.14 with. The authors' models go without.
 float grid_spread(uint model, grid_light light)
 {
     return model <= EMISSION_MEAN_NORMAL ? 0.0 : dot(light.deviation, light.deviation);

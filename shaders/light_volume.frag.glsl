@@ -3,6 +3,10 @@
 #extension GL_GOOGLE_include_directive : require
 #include "light_volume_fragment.glsl.h"
 
+// The reservoirs would otherwise put the depth test last.
+layout(early_fragment_tests) in;
+
+
 #define STAGE in
 #include "light_volume_varyings.glsl.h"
 

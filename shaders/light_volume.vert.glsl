@@ -25,8 +25,8 @@ struct volume {
 volume find_volume(uint instance)
 {
     uint tiles = push.interleave * push.interleave;
-    if (push.draw == DRAW_VPLS) // slots lie path by path: dealing by index spreads each path over the tiles
-        return volume(instance, header.level_count, instance % tiles, true);
+    if (push.draw == DRAW_VPLS) // slots lie path by path; the shift keeps bounces from falling into one tile each
+        return volume(instance, header.level_count, (instance + instance / tiles) % tiles, true);
     uint c = push.draw == DRAW_FIRST ? header.level_count - 1u : 1u;
     for (;; c++) {
         uint count = header.levels[c].occupied;
@@ -65,8 +65,20 @@ grid_light light_of(uint light)
     return grid_light(v.position, v.intensity, v.color, light, vec3(0.0), v.normal, vec3(0.0), vec3(0.0));
 }
 
+// Outside every plane: nothing is drawn.
+void clip_away()
+{
+    gl_Position = vec4(0.0, 0.0, -1.0, 1.0);
+    for (int i = 0; i < 4; i++)
+        gl_ClipDistance[i] = -1.0;
+}
+
 void main()
 {
+    if (header.level_count == 0u) { // no light at all
+        clip_away();
+        return;
+    }
     volume v = find_volume(gl_InstanceIndex);
     grid_light light = light_of(v.light);
     float radius = radius_of(v.c);
@@ -77,13 +89,13 @@ void main()
     light_normal = light.normal;
     light_diagonal = light.moment_diagonal;
     light_mixed = light.moment_mixed;
-    light_names = uvec4(v.light | (push.draw == DRAW_VPLS ? RESERVOIR_VPL : 0u), light.vertex, v.c, blend_kind(v.c, lowest_exponent()));
-    if (light.intensity <= 0.0) { // nothing to draw
-        gl_Position = vec4(0.0, 0.0, -1.0, 1.0);
-        for (int i = 0; i < 4; i++)
-            gl_ClipDistance[i] = -1.0;
+    light_names = uvec4(v.light | (push.draw == DRAW_VPLS ? RESERVOIR_VPL : 0u), light.vertex, v.c,
+                        blend_kind(v.c, lowest_exponent()));
+    if (light.intensity <= 0.0) {
+        clip_away();
         return;
     }
     vec3 position = light.position + 2.0 * radius * cube_corner(gl_VertexIndex);
-    gl_Position = into_tile(frame.view_projection * vec4(position, 1.0), uvec2(v.tile % push.interleave, v.tile / push.interleave));
+    gl_Position = into_tile(frame.view_projection * vec4(position, 1.0),
+                            uvec2(v.tile % push.interleave, v.tile / push.interleave));
 }

@@ -201,14 +201,16 @@ SHARED_STRUCT(lgh_header) {
     uint level_count;    // 0: no light at all
     uint light_count;    // grid lights of all levels
     uint vpl_count;      // occupied slots
-    uint word_count;     // mask words of the levels in use
+    uint word_count;     // vertex mask words of the levels in use
     lgh_level levels[LGH_EXPONENTS];
+    lgh_dispatch word_dispatch[2]; // [0] vertex masks, [1] cell masks of S1: 256 words per workgroup
+    lgh_dispatch scan_dispatch[2]; // the same, LGH_SCAN_WORDS per workgroup
     lgh_dispatch light_dispatch;  // one invocation per grid light
     lgh_dispatch first_dispatch;  // one invocation per vertex of S1
     lgh_dispatch restrict_dispatch[LGH_EXPONENTS]; // [t] builds S_(t+1), t >= 1: one invocation per vertex
     lgh_dispatch gather_dispatch[LGH_EXPONENTS];   // the same by one workgroup per vertex
     lgh_draw volume_draw;       // light volumes of the levels between S1 and the top: 14 vertices an instance
     lgh_draw volume_first_draw; // those of S1, where it is not the top
-} SHARED_END(lgh_header, 32 + 160 + 32 + 320 + 32)
+} SHARED_END(lgh_header, 32 + 160 + 64 + 32 + 320 + 32)
 
 #endif

@@ -114,7 +114,8 @@ void clear_slots(uint path, uint bounce)
 uint trace_path(uint path)
 {
     light_ray ray = emit(path);
-    for (uint bounce = 0u; bounce < push.bounces && path * push.bounces + bounce < push.slot_count; bounce++) {
+    uint bounce = 0u;
+    for (; bounce < push.bounces && path * push.bounces + bounce < push.slot_count; bounce++) {
         surface_hit hit;
         if (!ray_nearest(ray.origin, ray.direction, 1e30, hit)) {
             clear_slots(path, bounce);
@@ -129,7 +130,7 @@ uint trace_path(uint path)
         vec4 u = sobol(path, 2u + bounce, frame.seed);
         ray.direction = basis_of(normal) * cosine_direction(u.xy);
     }
-    return push.bounces;
+    return bounce;
 }
 
 void main()

@@ -202,7 +202,9 @@ static void progress_show_frame(uint32_t frame, uint32_t frames, double seconds_
 // Warns of a black picture, and refuses parts of the picture that are not made, before the other frames are rendered.
 static bool first_frame_check(const render_state *state)
 {
-    if (state->renderer->gpu_world->light_power <= 0) {
+    if (state->renderer->gpu_world->instance_count == 0) {
+        log_warning("%s: no geometry is in place (nodes scaled to nothing?): the picture will be black", state->scene->path);
+    } else if (state->renderer->gpu_world->light_power <= 0) {
         log_warning("%s: no lights: the picture will be black", state->scene->path);
     }
     return aovs_check(state);

@@ -1,5 +1,4 @@
-// The sum over every VPL, unshadowed, at each pixel: what the lighting grid hierarchy approximates. A share of the VPLs
-// per dispatch, so that progress is possible; `indirect_map` accumulates.
+// The sum over every VPL, unshadowed, at each pixel: what the lighting grid hierarchy approximates.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "../../shaders/scene.glsl.h"

@@ -1,0 +1,42 @@
+// What the steps that walk the sorted VPLs around each vertex of S1 share: one invocation a vertex.
+#ifndef LGH_BUILD_FIRST_GLSL_H
+#define LGH_BUILD_FIRST_GLSL_H
+
+#include "lgh_sums.glsl.h"
+
+layout(local_size_x = 64) in;
+layout(set = 0, binding = 0, scalar) readonly buffer vpls_block { vpl vpls[]; };
+layout(set = 0, binding = 1, scalar) readonly buffer header_block { lgh_header header; };
+layout(set = 0, binding = 2, scalar) readonly buffer vertices_block { uint vertices[]; };
+layout(set = 0, binding = 3, scalar) readonly buffer order_block { uint order[]; };
+layout(set = 0, binding = 4, scalar) readonly buffer cell_masks_block { uint cell_masks[]; };
+layout(set = 0, binding = 5, scalar) readonly buffer cell_ranks_block { uint cell_ranks[]; };
+layout(set = 0, binding = 6, scalar) readonly buffer cell_starts_block { uint cell_starts[]; };
+
+#include "lgh_cells.glsl.h"
+
+// This invocation's vertex and its place in the merged arrays; false past the last.
+bool first_vertex(out uint place, out uvec3 vertex)
+{
+    uint i = gl_WorkGroupID.y * 65535u * 64u + gl_GlobalInvocationID.x;
+    uint c = header.level_count - 1u;
+    if (i >= header.levels[c].occupied)
+        return false;
+    place = header.levels[c].first_light + i;
+    vertex = unpack_vertex(vertices[place]);
+    return true;
+}
+
+// Range in the sorted order of the VPLs in one of the eight cells around a vertex of S1.
+uvec2 corner_range(uvec3 vertex, uint corner)
+{
+    return cell_range(ivec3(vertex) - 1 + ivec3(uvec3(corner, corner >> 1, corner >> 2) & 1u));
+}
+
+// Where a VPL lies relative to a vertex of S1, in cells.
+vec3 cell_offset(vpl light, uvec3 vertex)
+{
+    return grid_position(light.position, header.origin, header.top_size, header.level_count - 1u) - vec3(vertex);
+}
+
+#endif
