@@ -4,6 +4,7 @@
 //     device_lgh                                the tests
 //     device_lgh table SCENE [CAMERA [VPLS]]    error, energy and lights per pixel of every emission model, 320x180
 //     device_lgh shadows SCENE [CAMERA [VPLS]]  error and energy of the end points with shadows, 96x54
+#include "quad_scene.h"
 #include "test.h"
 
 #include "modules/renderer.h"
@@ -362,6 +363,33 @@ TEST(level_count_is_the_largest_with_fewer_vertices_than_half_the_vpls)
     fixture_destroy(&f);
 }
 
+// Auto levels of a strip of 40 m by 1 m in the sun, where grids much finer than in a room stay below half the VPLs.
+TEST(long_scenes_get_the_finer_grids_that_they_can_use)
+{
+    static const float strip[16] = {20, 0, 0, 0, 0, 0, -0.5f, 0, 0, 1, 0, 0, 0, 0, 0, 1};
+    quad_scene q;
+    quad_scene_init(&q);
+    quad_add(&q, strip);
+    memcpy(q.data.bounds_min, (float[3]){-20, -0.01f, -0.5f}, 12);
+    memcpy(q.data.bounds_max, (float[3]){20, 0.01f, 0.5f}, 12);
+    const render_settings s = small_settings(16, 16, 60000);
+    renderer *r = renderer_create(device, &q.data, &s);
+    r->camera = renderer_camera_of_scene(r, SCENE_NONE);
+    world_sun_add(r, (float[3]){0, -1, 0.1f}, 10);
+    hierarchy h = hierarchy_render(r);
+    const uint32_t levels = h.header->level_count;
+    printf("  %u VPLs, %u levels, S1 has %u vertices\n", h.header->vpl_count, levels, h.header->levels[levels - 1].occupied);
+    CHECK(levels >= 8);
+    CHECK(2 * h.header->levels[levels - 1].occupied < h.header->vpl_count);
+    hierarchy_free(&h);
+    r->settings.levels = levels + 1;
+    h = hierarchy_render(r);
+    CHECK(h.header->level_count == levels + 1 || levels == LGH_EXPONENTS);
+    CHECK(levels == LGH_EXPONENTS || 2 * h.header->levels[levels].occupied >= h.header->vpl_count);
+    hierarchy_free(&h);
+    renderer_destroy(r);
+}
+
 TEST(few_and_no_vpls_are_fine)
 {
     static const uint32_t counts[] = {0, 1, 2, 3, 7, 65};
@@ -714,6 +742,7 @@ int main(int argc, char **argv)
     RUN(other_ways_to_build_carry_the_flux_too);
     RUN(restriction_equals_scattering);
     RUN(level_count_is_the_largest_with_fewer_vertices_than_half_the_vpls);
+    RUN(long_scenes_get_the_finer_grids_that_they_can_use);
     RUN(few_and_no_vpls_are_fine);
     RUN(error_falls_with_alpha);
     RUN(the_furnace_has_its_closed_form);

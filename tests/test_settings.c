@@ -39,7 +39,7 @@ TEST(defaults_are_the_documented_ones)
     CHECK(settings.width == 1280 && settings.height == 720);
     CHECK(settings.vpls == 100000 && settings.bounces == 3 && settings.alpha == 1 && settings.levels == 0);
     CHECK(settings.shadow_samples == 1 && settings.interleave == 1 && settings.emission == EMISSION_AB);
-    CHECK(settings.end_point == END_POINT_JITTER && settings.build == LGH_BUILD_RESTRICT &&
+    CHECK(settings.end_point == END_POINT_VPL && settings.build == LGH_BUILD_RESTRICT &&
           settings.s1 == LGH_S1_ORDERED);
     CHECK(settings.reservoirs == RESERVOIRS_EXACT && settings.sampling == SAMPLING_IMPORTANCE);
     CHECK(settings.start_level == 1 && !settings.sample_s1 && settings.filter && settings.taa);

@@ -168,8 +168,23 @@ static void exports_set(renderer *r, const render_request *request)
     for (uint32_t i = 0; i < request->aov_count; i++) {
         aov_export(r, request->aovs[i].aov);
     }
+    if (r->settings.levels > 0) {
+        export_add(r, "lgh_header|-");
+    }
     if (request->stats) {
         stats_export(r);
+    }
+}
+
+// A number of levels that was asked for may not fit: into the finest grid, or into a buffer.
+static void levels_check(renderer *r)
+{
+    const gpu_buffer buffer = r->settings.levels > 0 ? frame_graph_find_buffer(r->graph, "lgh_header|-") : (gpu_buffer){0};
+    lgh_header header;
+    if (buffer.id && gpu_buffer_read(r->gpu, buffer, 0, &header, sizeof(header)) && header.level_count > 0 &&
+        header.level_count < r->settings.levels) {
+        log_warning("--levels %u: %u are built; more grid lights than that do not fit into one buffer", r->settings.levels,
+                    header.level_count);
     }
 }
 
@@ -207,6 +222,7 @@ static bool first_frame_check(const render_state *state)
     } else if (state->renderer->gpu_world->light_power <= 0) {
         log_warning("%s: no lights: the picture will be black", state->scene->path);
     }
+    levels_check(state->renderer);
     return aovs_check(state);
 }
 
