@@ -10,7 +10,8 @@
 
 #include "common.glsl.h"
 
-// In `lgh_samples`, the VPLs at which shadow rays to a grid light may end: there is none, as the light has no intensity.
+// In `lgh_samples`, four choices on the way from a grid light to one of its VPLs (a finer grid light's place, from S1 a
+// VPL's slot): there is none, as the light has no intensity.
 const uint LGH_NO_SAMPLE = 0xffffffffu;
 
 // Words before exponent c's masks, and after the last: 16 ceil((2^c + 1) / 8)^3 words each.

@@ -1,5 +1,5 @@
-// Four VPLs for each vertex of S2..top: each comes from one of the 27 finer vertices around it, drawn in proportion to its
-// share of the vertex's weight.
+// Four finer vertices for each vertex of S2..top, out of the 27 around it, drawn in proportion to their shares of its
+// intensity. A shadow ray walks down such choices to a VPL, so that from the top 4^levels VPLs may be met each frame.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "lgh_sums.glsl.h"
@@ -8,7 +8,7 @@ layout(push_constant, scalar) uniform push_block { uint step, key; } push;
 #include "lgh_build.coarse.glsl.h"
 
 layout(set = 0, binding = 4, scalar) readonly buffer sums_block { lgh_sums sums[]; };
-layout(set = 0, binding = 5, scalar) buffer samples_block { uvec4 samples[]; };
+layout(set = 0, binding = 5, scalar) writeonly buffer samples_block { uvec4 samples[]; };
 
 void main()
 {
@@ -29,7 +29,7 @@ void main()
         for (uint k = 0u; k < 4u; k++) {
             random = hash(random);
             if (unit_float(random) * sum < weight)
-                chosen[k] = samples[fine][random & 3u];
+                chosen[k] = fine;
         }
     }
     samples[place] = chosen;

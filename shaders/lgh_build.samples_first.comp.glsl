@@ -1,4 +1,4 @@
-// One VPL for each vertex of S1, drawn in proportion to trilinear weight times intensity: where shadow rays to it may end.
+// Four VPLs for each vertex of S1, drawn in proportion to trilinear weight times intensity: where shadow rays may end.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "lgh_build.first.glsl.h"
@@ -12,7 +12,8 @@ void main()
     uvec3 vertex;
     if (!first_vertex(place, vertex))
         return;
-    uint random = hash(push.key, vertices[place], header.level_count), chosen = LGH_NO_SAMPLE;
+    uint random = hash(push.key, vertices[place], header.level_count);
+    uvec4 chosen = uvec4(LGH_NO_SAMPLE);
     float sum = 0.0;
     for (uint corner = 0u; corner < 8u; corner++) {
         uvec2 range = corner_range(vertex, corner);
@@ -20,10 +21,12 @@ void main()
             vpl light = vpls[order[j]];
             float weight = trilinear(cell_offset(light, vertex)) * light.intensity;
             sum += weight;
-            random = hash(random);
-            if (unit_float(random) * sum < weight)
-                chosen = order[j];
+            for (uint k = 0u; k < 4u; k++) {
+                random = hash(random);
+                if (unit_float(random) * sum < weight)
+                    chosen[k] = order[j];
+            }
         }
     }
-    samples[place] = uvec4(chosen);
+    samples[place] = chosen;
 }

@@ -76,7 +76,7 @@ shadow_sample grid_sample(uint index, gbuffer_point p, uint random)
     vec3 sent = grid_light_sent(light, light.position, push.emission, p.position, p.geometric, p.shading, push.singularity);
     shadow_sample s;
     s.centre_light = scale * sent;
-    s.end_light = scale * end_point_light(light, index, sent, p, random, s.end);
+    s.end_light = scale * end_point_light(light, index, c, sent, p, random, s.end);
     return s;
 }
 

@@ -14,10 +14,14 @@ vec3 jittered(grid_light light, uint random)
 #ifdef END_POINT_VPL
 
 // What the light's end point sends in the whole light's place, without blending; `end` becomes the end point.
-vec3 end_point_light(grid_light light, uint index, vec3 centre_light, gbuffer_point p, uint random, out vec3 end)
+vec3 end_point_light(grid_light light, uint index, uint c, vec3 centre_light, gbuffer_point p, uint random, out vec3 end)
 {
     end = light.position;
-    uint slot = samples[index][random & 3u];
+    uint slot = index; // of a VPL in the end; on the way, the place of a grid light
+    for (; c < header.level_count && slot != LGH_NO_SAMPLE; c++) {
+        random = hash(random);
+        slot = samples[slot][random & 3u];
+    }
     if (slot == LGH_NO_SAMPLE)
         return centre_light;
     end = vpls[slot].position;
@@ -27,7 +31,7 @@ vec3 end_point_light(grid_light light, uint index, vec3 centre_light, gbuffer_po
 
 #else
 
-vec3 end_point_light(grid_light light, uint index, vec3 centre_light, gbuffer_point p, uint random, out vec3 end)
+vec3 end_point_light(grid_light light, uint index, uint c, vec3 centre_light, gbuffer_point p, uint random, out vec3 end)
 {
     end = light.position;
     if (!JITTER)
