@@ -3,6 +3,7 @@
 #ifndef LGH_SHADE_GLSL_H
 #define LGH_SHADE_GLSL_H
 
+#include "gbuffer.glsl.h"
 #include "lgh.glsl.h"
 
 const uint BLEND_LOWEST = 0u; // the lowest level in use
@@ -21,7 +22,12 @@ float lgh_blend(uint kind, float d, float r)
 
 // Kind of exponent c's level. `lowest` is the exponent of the lowest level in use: level_count - 1 for S1, or
 // level_count for the VPLs themselves (start level 0).
-uint blend_kind(uint c, uint lowest) { return lowest == 0u ? BLEND_ONLY : c == lowest ? BLEND_LOWEST : c == 0u ? BLEND_TOP : BLEND_MIDDLE; }
+uint blend_kind(uint c, uint lowest)
+{
+    if (lowest == 0u)
+        return BLEND_ONLY;
+    return c == lowest ? BLEND_LOWEST : c == 0u ? BLEND_TOP : BLEND_MIDDLE;
+}
 
 // What a grid light's VPLs send towards the unit direction v, relative to their intensity: an estimate of the mean over
 // their normals n of max(0, n.v), from the mean normal m and the second moment M.
@@ -39,8 +45,8 @@ float grid_emission(uint model, grid_light light, vec3 v)
 }
 
 // A grid light is no nearer than its own spread, the square of its VPLs' standard deviation, in the models A, B and AB.
-// Without it the one point in their midst glares where they would light the surface evenly: measured, relative L2 in the
-// atrium at alpha 1 and 2, 0.28 and 0.20 without, 0.23 and 0.14 with. The authors' models go without.
+// Without it the one point in their midst glares where they would light the surface evenly: measured, relative L2 in
+// the atrium at alpha 1 and 2, 0.28 and 0.20 without, 0.23 and 0.14 with. The authors' models go without.
 float grid_spread(uint model, grid_light light)
 {
     return model <= EMISSION_MEAN_NORMAL ? 0.0 : dot(light.deviation, light.deviation);
@@ -49,28 +55,28 @@ float grid_spread(uint model, grid_light light)
 // Radiance over albedo that a unit of light from `position` gives a surface point before the emission factor:
 // cos / (pi (d^2 + b^2)), where d^2 is at least `nearest`; zero from behind either normal. `to_point` becomes the unit
 // direction from light to point.
-float receive(vec3 position, float nearest, vec3 point, vec3 geometric, vec3 shading, float singularity, out vec3 to_point)
+float receive(vec3 position, float nearest, gbuffer_point p, float singularity, out vec3 to_point)
 {
-    vec3 offset = point - position;
+    vec3 offset = p.position - position;
     float square = dot(offset, offset);
     to_point = offset * inversesqrt(max(square, 1e-20));
-    if (dot(geometric, to_point) >= 0.0)
+    if (dot(p.geometric, to_point) >= 0.0)
         return 0.0;
-    return max(0.0, -dot(shading, to_point)) / (PI * (max(square, nearest) + singularity * singularity + 1e-20));
+    return max(0.0, -dot(p.shading, to_point)) / (PI * (max(square, nearest) + singularity * singularity + 1e-20));
 }
 
 // What a grid light sends to a surface point, radiance over albedo.
-vec3 grid_light_sent(grid_light light, vec3 position, uint model, vec3 point, vec3 geometric, vec3 shading, float singularity)
+vec3 grid_light_sent(grid_light light, vec3 position, uint model, gbuffer_point p, float singularity)
 {
     vec3 v;
-    float received = receive(position, grid_spread(model, light), point, geometric, shading, singularity, v);
+    float received = receive(position, grid_spread(model, light), p, singularity, v);
     return light.color * (received * grid_emission(model, light, v));
 }
 
-vec3 vpl_light(vpl light, vec3 point, vec3 geometric, vec3 shading, float singularity)
+vec3 vpl_light(vpl light, gbuffer_point p, float singularity)
 {
     vec3 v;
-    float received = receive(light.position, 0.0, point, geometric, shading, singularity, v);
+    float received = receive(light.position, 0.0, p, singularity, v);
     return light.color * (received * max(0.0, dot(light.normal, v)));
 }
 

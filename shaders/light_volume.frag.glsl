@@ -20,9 +20,10 @@ void main()
     float blend = lgh_blend(light_names.w, distance(light_position.xyz, pixel.point.position), light_position.w);
     if (blend <= 0.0)
         discard;
-    grid_light light = grid_light(light_position.xyz, 0.0, light_color, light_names.y, vec3(0.0), light_normal, light_diagonal, light_mixed);
+    grid_light light = grid_light(light_position.xyz, 0.0, light_color, light_names.y, vec3(0.0), light_normal,
+                                  light_diagonal, light_mixed);
     vec3 v;
-    float received = receive(light.position, light_spread, pixel.point.position, pixel.point.geometric, pixel.point.shading, push.singularity, v);
+    float received = receive(light.position, light_spread, pixel.point, push.singularity, v);
     float emitted = push.draw == DRAW_VPLS ? max(0.0, dot(light.normal, v)) : grid_emission(push.emission, light, v);
     add_light(pixel, light.color * (received * emitted), blend, light_names.x, light.vertex, light_names.z);
 }

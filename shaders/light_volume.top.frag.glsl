@@ -16,8 +16,7 @@ void main()
         float blend = lgh_blend(kind, distance(g.position, pixel.point.position), radius_of(0u));
         if (blend <= 0.0)
             continue;
-        vec3 light = grid_light_sent(g, g.position, push.emission, pixel.point.position, pixel.point.geometric,
-                                     pixel.point.shading, push.singularity);
+        vec3 light = grid_light_sent(g, g.position, push.emission, pixel.point, push.singularity);
         add_light(pixel, light, blend, i, g.vertex, 0u);
     }
 }

@@ -40,7 +40,8 @@ layout(constant_id = 2) const bool JITTER = false; // end points of shadow.comp.
 
 uint reservoir_light(uint pixel, uint s)
 {
-    return EXACT ? uint(reservoir_keys[pixel * push.samples + s]) : reservoir_words[pixel * (push.samples + 1u) + 1u + s];
+    return EXACT ? uint(reservoir_keys[pixel * push.samples + s])
+                 : reservoir_words[pixel * (push.samples + 1u) + 1u + s];
 }
 
 // The light of a sample as the light volumes saw it: what it sends to the point, blended and dealt, and what its end
@@ -61,8 +62,9 @@ shadow_sample vpl_sample(uint slot, gbuffer_point p)
 {
     vpl light = vpls[slot];
     float r = 0.5 * header.levels[header.level_count - 1u].radius;
-    float scale = lgh_blend(BLEND_LOWEST, distance(light.position, p.position), r) * float(push.interleave * push.interleave);
-    vec3 sent = scale * vpl_light(light, p.position, p.geometric, p.shading, push.singularity);
+    float scale = float(push.interleave * push.interleave);
+    scale *= lgh_blend(BLEND_LOWEST, distance(light.position, p.position), r);
+    vec3 sent = scale * vpl_light(light, p, push.singularity);
     return shadow_sample(sent, sent, light.position);
 }
 
@@ -73,7 +75,7 @@ shadow_sample grid_sample(uint index, gbuffer_point p, uint random)
     uint lowest = push.start_level == 0u ? header.level_count : header.level_count - 1u;
     float scale = lgh_blend(blend_kind(c, lowest), distance(light.position, p.position), header.levels[c].radius);
     scale *= dealt_factor(header.levels[c].occupied);
-    vec3 sent = grid_light_sent(light, light.position, push.emission, p.position, p.geometric, p.shading, push.singularity);
+    vec3 sent = grid_light_sent(light, light.position, push.emission, p, push.singularity);
     shadow_sample s;
     s.centre_light = scale * sent;
     s.end_light = scale * end_point_light(light, index, c, sent, p, random, s.end);
@@ -83,7 +85,8 @@ shadow_sample grid_sample(uint index, gbuffer_point p, uint random)
 // Adds one sample to U and S; returns the number of rays.
 uint shade_sample(uint light, float f_sum, gbuffer_point p, uint random, inout vec3 u, inout vec3 s)
 {
-    shadow_sample chosen = (light & RESERVOIR_VPL) != 0u ? vpl_sample(light & ~RESERVOIR_VPL, p) : grid_sample(light, p, random);
+    bool is_vpl = (light & RESERVOIR_VPL) != 0u;
+    shadow_sample chosen = is_vpl ? vpl_sample(light & ~RESERVOIR_VPL, p) : grid_sample(light, p, random);
     float f = UNIFORM ? 1.0 : luminance(chosen.centre_light);
     vec3 estimate = f > 0.0 ? chosen.end_light * (f_sum / (f * float(push.samples))) : vec3(0.0);
     if (luminance(estimate) <= 0.0)

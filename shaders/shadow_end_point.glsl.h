@@ -14,7 +14,8 @@ vec3 jittered(grid_light light, uint random)
 #ifdef END_POINT_VPL
 
 // What the light's end point sends in the whole light's place, without blending; `end` becomes the end point.
-vec3 end_point_light(grid_light light, uint index, uint c, vec3 centre_light, gbuffer_point p, uint random, out vec3 end)
+vec3 end_point_light(grid_light light, uint index, uint c, vec3 centre_light, gbuffer_point p, uint random,
+                     out vec3 end)
 {
     end = light.position;
     uint slot = index; // of a VPL in the end; on the way, the place of a grid light
@@ -25,19 +26,20 @@ vec3 end_point_light(grid_light light, uint index, uint c, vec3 centre_light, gb
     if (slot == LGH_NO_SAMPLE)
         return centre_light;
     end = vpls[slot].position;
-    vec3 sent = vpl_light(vpls[slot], p.position, p.geometric, p.shading, push.singularity);
+    vec3 sent = vpl_light(vpls[slot], p, push.singularity);
     return sent * (light.intensity / vpls[slot].intensity);
 }
 
 #else
 
-vec3 end_point_light(grid_light light, uint index, uint c, vec3 centre_light, gbuffer_point p, uint random, out vec3 end)
+vec3 end_point_light(grid_light light, uint index, uint c, vec3 centre_light, gbuffer_point p, uint random,
+                     out vec3 end)
 {
     end = light.position;
     if (!JITTER)
         return centre_light;
     end = jittered(light, random);
-    return grid_light_sent(light, end, push.emission, p.position, p.geometric, p.shading, push.singularity);
+    return grid_light_sent(light, end, push.emission, p, push.singularity);
 }
 
 #endif

@@ -72,7 +72,8 @@ SHARED_STRUCT(vertex_attributes) {
     uint color_rg, color_ba; // linear, unorm16 pairs, multiplies the base colour
 } SHARED_END(vertex_attributes, 52)
 
-SHARED_STRUCT(mesh_primitive) { // a range of triangles with one material; the geometries of a mesh's BLAS are its primitives in order
+// A range of triangles with one material; the geometries of a mesh's BLAS are its primitives in order.
+SHARED_STRUCT(mesh_primitive) {
     uint first_index, index_count;
     uint first_vertex, vertex_count;
     uint material;
@@ -91,7 +92,7 @@ SHARED_STRUCT(mesh_instance_gpu) {
 SHARED_STRUCT(texture_reference) {
     uint texture; // index into the bindless array, or TEXTURE_NONE
     uint uv_set;  // 0 or 1
-    SHARED_VEC4(transform); // columns of KHR_texture_transform's 2x2 part: uv' = mat2(transform.xy, transform.zw) * uv + offset
+    SHARED_VEC4(transform); // columns of KHR_texture_transform's 2x2 part: uv' = mat2(xy, zw) * uv + offset
     SHARED_VEC2(offset);
 } SHARED_END(texture_reference, 32)
 

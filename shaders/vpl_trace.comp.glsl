@@ -76,7 +76,8 @@ light_ray emitter_ray(emissive_triangle emitter, vec2 u, vec2 v)
     }
     vec3 radiance = emitter.emission;
     if (emitter.textured != 0u) {
-        vec2 uv = emitter.uv0 + barycentrics.x * (emitter.uv1 - emitter.uv0) + barycentrics.y * (emitter.uv2 - emitter.uv0);
+        vec2 uv = emitter.uv0 + barycentrics.x * (emitter.uv1 - emitter.uv0) +
+                  barycentrics.y * (emitter.uv2 - emitter.uv0);
         material m = materials[emitter.material];
         radiance = m.emissive * textureLod(textures[nonuniformEXT(m.emissive_texture.texture)], uv, 0.0).rgb;
     }

@@ -22,6 +22,6 @@ void main()
     if (gbuffer_read(depth_map, normal_map, pixel, p))
         for (uint i = 0u; i < push.slot_count; i++)
             if (vpls[i].intensity > 0.0)
-                sum += vpl_light(vpls[i], p.position, p.geometric, p.shading, push.singularity);
+                sum += vpl_light(vpls[i], p, push.singularity);
     imageStore(sum_map, ivec2(pixel), vec4(sum, 1.0));
 }

@@ -23,7 +23,7 @@ void main()
     if (gbuffer_read(depth_map, normal_map, pixel, p)) {
         vec3 origin = offset_origin(p.position, p.geometric, frame.scene_radius);
         for (uint i = 0u; i < push.slot_count; i++) {
-            vec3 light = vpl_light(vpls[i], p.position, p.geometric, p.shading, push.singularity);
+            vec3 light = vpl_light(vpls[i], p, push.singularity);
             if (vpls[i].intensity <= 0.0 || luminance(light) <= 0.0)
                 continue;
             vec3 offset = vpls[i].position - origin;

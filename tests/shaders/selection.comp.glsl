@@ -25,8 +25,9 @@ void main()
         if (hit && i < header.light_count) {
             grid_light g = grid_lights[i];
             uint c = light_exponent(header, i);
-            float blend = lgh_blend(blend_kind(c, header.level_count - 1u), distance(g.position, p.position), header.levels[c].radius);
-            f = luminance(blend * grid_light_sent(g, g.position, push.emission, p.position, p.geometric, p.shading, push.singularity));
+            float blend = lgh_blend(blend_kind(c, header.level_count - 1u), distance(g.position, p.position),
+                                    header.levels[c].radius);
+            f = luminance(blend * grid_light_sent(g, g.position, push.emission, p, push.singularity));
         }
         weights[pixel * push.light_capacity + i] = f;
     }
