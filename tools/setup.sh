@@ -13,6 +13,7 @@ libvulkan-dev|Vulkan headers and loader|
 mesa-vulkan-drivers|lavapipe with ray query, which stock Debian 12 lacks|-t
 vulkan-validationlayers|validation in the device tests|
 glslang-dev|compiling shaders|
+glslang-tools|named by the CMake files of glslang-dev|
 spirv-tools|checking shaders (spirv-val)|
 libspirv-cross-c-shared-dev|reading shader bindings|
 libcglm-dev|matrices and vectors|
