@@ -86,7 +86,7 @@ TEST(size_takes_two_sides_of_1_to_16384_pixels)
 TEST(whole_numbers_keep_to_their_ranges)
 {
     CHECK(set("vpls", "0") && settings.vpls == 0);
-    CHECK(set("vpls", "4000000") && settings.vpls == 4000000);
+    CHECK(set("vpls", "2500000") && settings.vpls == 2500000);
     CHECK(set("seed", "4294967295") && settings.seed == UINT32_MAX);
     CHECK(set("start-level", "0") && settings.start_level == 0);
     CHECK(set("shadow-samples", "8") && settings.shadow_samples == 8);
@@ -98,7 +98,7 @@ TEST(whole_numbers_keep_to_their_ranges)
     CHECK(malformed("vpls", "1e5") && malformed("vpls", "10 ") && malformed("vpls", "0x10") &&
           malformed("vpls", "1.5"));
     CHECK(malformed("vpls", "") && malformed("vpls", "ten"));
-    CHECK_STRING(error.message, "--vpls: expected a whole number from 0 to 4000000, got \"ten\"");
+    CHECK_STRING(error.message, "--vpls: expected a whole number from 0 to 2500000, got \"ten\"");
 }
 
 TEST(alpha_is_greater_than_0_and_at_most_16)
@@ -182,7 +182,7 @@ TEST(switches_take_no_value_or_a_truth_value)
 TEST(an_option_without_its_value_is_refused)
 {
     CHECK(!set("vpls", NULL));
-    CHECK_STRING(error.message, "--vpls: expected a whole number from 0 to 4000000");
+    CHECK_STRING(error.message, "--vpls: expected a whole number from 0 to 2500000");
 }
 
 TEST(a_long_value_is_cut_in_the_message)
