@@ -662,7 +662,7 @@ static int print_table(const char *path, const char *camera, uint32_t vpls)
             f.r->settings.emission = model;
             f.r->settings.alpha = (float)(1u << a);
             const comparison c = compare_with_brute_force(f.r, reference);
-            printf(" %.3f / %.3f |", c.error, c.energy);
+            printf(" %.4f / %.3f |", c.error, c.energy);
             fflush(stdout);
             lights[a] = c.lights;
         }
