@@ -63,6 +63,8 @@ static void composite_setup(renderer *r, void *user)
     composite_state *state = user;
     frame_graph_import_image(r->graph, "black", state->black, ACCESS_SAMPLED, ACCESS_SAMPLED);
     frame_graph_import_image(r->graph, "white", state->white, ACCESS_SAMPLED, ACCESS_SAMPLED);
+    if (r->settings.method != METHOD_LGH)
+        return; // progressive makes the picture
     composite_declare(r, state, "composite", "radiance", parts_of_radiance(r->settings.only));
     composite_declare(r, state, "composite/aov_direct", "aov_direct", PART_DIRECT);
     composite_declare(r, state, "composite/aov_indirect", "aov_indirect", PART_INDIRECT);

@@ -5,6 +5,7 @@
 bool modules_init(renderer *r)
 {
     static bool (*const inits[])(renderer *) = {
+        rays_init, // traces the batches of rays that the other passes make
         acceleration_init, // top-level acceleration structure over the instances
         vpl_trace_init, // light paths by ray query, one virtual point light a bounce
         lgh_build_init, // the lighting grid hierarchy over the VPLs
@@ -15,6 +16,8 @@ bool modules_init(renderer *r)
         interleave_init, // gathers interleaved tiles
         svgf_init, // filters the shadowed and unshadowed estimates alike
         taa_init, // steadies their ratio over time
+        vpl_reference_init, // reference: every VPL at every pixel, and instant radiosity
+        path_trace_init, // reference: path tracing
         composite_init, // emission + albedo * (direct + indirect * ratio)
         tonemap_init, // exposure and tone curve
     };

@@ -5,6 +5,7 @@
 
 bool modules_init(renderer *r); // false on failure (logged)
 
+bool rays_init(renderer *r);
 bool acceleration_init(renderer *r);
 bool vpl_trace_init(renderer *r);
 bool lgh_build_init(renderer *r);
@@ -15,5 +16,7 @@ bool shadow_init(renderer *r);
 bool interleave_init(renderer *r);
 bool svgf_init(renderer *r);
 bool taa_init(renderer *r);
+bool vpl_reference_init(renderer *r);
+bool path_trace_init(renderer *r);
 bool composite_init(renderer *r);
 bool tonemap_init(renderer *r);

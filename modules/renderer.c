@@ -181,10 +181,20 @@ entity renderer_pass_find(const renderer *r, const char *name)
     return (entity){0};
 }
 
+uint32_t renderer_vpl_slots(const renderer *r)
+{
+    return r->settings.method == METHOD_IR ? r->settings.ir_vpls : r->settings.vpls;
+}
+
+bool renderer_has_vpls(const renderer *r)
+{
+    return r->settings.method != METHOD_PATH && r->settings.only != ONLY_DIRECT && renderer_vpl_slots(r) > 0 &&
+           r->gpu_world->light_power > 0 && r->gpu_world->instance_count > 0;
+}
+
 bool renderer_has_indirect(const renderer *r)
 {
-    return r->settings.only != ONLY_DIRECT && r->settings.vpls > 0 && r->gpu_world->light_power > 0 &&
-           r->gpu_world->instance_count > 0;
+    return r->settings.method == METHOD_LGH && renderer_has_vpls(r);
 }
 
 bool renderer_has_shadows(const renderer *r)

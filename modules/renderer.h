@@ -33,12 +33,13 @@
 //   filter_geometry    RGBA32F       shading normal and view depth, 0 where nothing is; for filters  svgf
 //   X_u_filtered, X_s_filtered       for X = shadow, direct                            svgf
 //   X_ratio            RGBA16F       S / U in [0,1], after TAA where it is on          taa
-//   radiance           RGBA32F       nits                                              composite
+//   radiance           RGBA32F       nits                    composite; progressive for the other methods
 //   aov_direct, aov_indirect  RGBA32F  their parts of `radiance`, when exported         composite
 //   black, white       1x1           stand in for what is absent: read min(pixel, textureSize - 1)  composite
 //   exposure           float         factor before the tone curve                      tonemap
 //   display            RGBA8         tone-mapped sRGB                                  tonemap
-//   rays_vpl, rays_direct, rays_shadow  uint                                           counted by the pass that traces
+//   rays_vpl, rays_direct, rays_shadow, rays_path  uint   of this frame, counted by the pass that makes them
+//   X_origins, X_directions, X_visible, X_hits     buffers  batches of rays and their answers; see rays.h
 #pragma once
 
 #include "engine/ecs.h"
@@ -99,7 +100,9 @@ void *renderer_pass_add(renderer *r, const char *name, size_t state_size, void (
 entity renderer_pass_find(const renderer *r, const char *name); // {0} when there is none
 
 // What several modules need to know of the current frame.
-bool renderer_has_indirect(const renderer *r); // settings ask for indirect light, and there are VPLs and lights
+bool renderer_has_vpls(const renderer *r); // settings ask for indirect light by VPLs, and there are VPLs and lights
+bool renderer_has_indirect(const renderer *r); // and the lighting grid hierarchy gathers them
+uint32_t renderer_vpl_slots(const renderer *r); // settings' vpls, or ir_vpls
 bool renderer_has_shadows(const renderer *r); // indirect light with shadow samples
 // b in metres: no light's singularity is closer than this.
 float renderer_singularity(const renderer *r);

@@ -15,6 +15,8 @@ render_settings render_settings_default(void)
     return (render_settings){
         .width = 1280,
         .height = 720,
+        .method = METHOD_LGH,
+        .rays = RAYS_AUTO,
         .vpls = 100000,
         .bounces = 3,
         .alpha = 1,
@@ -37,6 +39,9 @@ render_settings render_settings_default(void)
         .auto_exposure = true,
         .exposure = 0,
         .frames = 8,
+        .spp = 64,
+        .until = 0,
+        .ir_vpls = 300,
     };
 }
 
@@ -188,6 +193,15 @@ static void exposure_print(const render_settings *settings, char text[32])
 
 // ---- The table
 
+static const char *const method_names[] = {
+    [METHOD_LGH] = "lgh", [METHOD_PATH] = "path", [METHOD_VPL] = "vpl", [METHOD_IR] = "ir", NULL,
+};
+static const char *const ray_names[] = {
+    [RAYS_AUTO] = "auto",
+    [RAYS_QUERY] = "query",
+    [RAYS_EMBREE] = "embree",
+    NULL,
+};
 static const char *const only_names[] = {
     [ONLY_ALL] = "all",
     [ONLY_DIRECT] = "direct",
@@ -229,6 +243,16 @@ static const setting_info table[] = {
      .expected = "WIDTHxHEIGHT, each from 1 to 16384 pixels",
      .value_name = "WxH",
      .help = "size in pixels, each 1 to 16384"},
+    {.name = "method",
+     .type = SETTING_ENUM,
+     FIELD(method),
+     .values = method_names,
+     .help = "lighting grid hierarchy; references: path tracing, every VPL at every pixel; instant radiosity"},
+    {.name = "rays",
+     .type = SETTING_ENUM,
+     FIELD(rays),
+     .values = ray_names,
+     .help = "who traces rays; auto: Embree where the Vulkan device is a CPU, else ray query"},
     {.name = "vpls",
      .type = SETTING_UINT,
      FIELD(vpls),
@@ -335,6 +359,26 @@ static const setting_info table[] = {
      .max = 1000000,
      .value_name = "N",
      .help = "frames rendered so that temporal history settles, 1 to 1000000; the last is written"},
+    {.name = "spp",
+     .type = SETTING_UINT,
+     FIELD(spp),
+     .min = 1,
+     .max = 1 << 24,
+     .value_name = "N",
+     .help = "path: samples a pixel, 1 to 16777216"},
+    {.name = "until",
+     .type = SETTING_FLOAT,
+     FIELD(until),
+     .max = 1,
+     .value_name = "E",
+     .help = "path: stop at this estimated relative error (0.01 is 1 %), 0 to 1; 0: after all samples"},
+    {.name = "ir-vpls",
+     .type = SETTING_UINT,
+     FIELD(ir_vpls),
+     .min = 1,
+     .max = 65536,
+     .value_name = "N",
+     .help = "ir: slots for virtual point lights, in place of --vpls, 1 to 65536"},
 };
 #undef FIELD
 

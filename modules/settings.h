@@ -4,6 +4,8 @@
 
 #include "engine/base.h"
 
+typedef enum render_method { METHOD_LGH, METHOD_PATH, METHOD_VPL, METHOD_IR } render_method;
+typedef enum ray_method { RAYS_AUTO, RAYS_QUERY, RAYS_EMBREE } ray_method;
 typedef enum render_only { ONLY_ALL, ONLY_DIRECT, ONLY_INDIRECT, ONLY_INDIRECT_UNSHADOWED } render_only;
 typedef enum lgh_build_method { LGH_BUILD_RESTRICT, LGH_BUILD_GATHER, LGH_BUILD_SCATTER } lgh_build_method;
 typedef enum lgh_s1_method { LGH_S1_ORDERED, LGH_S1_ATOMIC } lgh_s1_method;
@@ -13,6 +15,8 @@ typedef enum sampling_method { SAMPLING_IMPORTANCE, SAMPLING_UNIFORM } sampling_
 
 typedef struct render_settings {
     uint32_t width, height; // pixels
+    uint32_t method;
+    uint32_t rays; // who traces them; RAYS_AUTO: Embree where the Vulkan device is a CPU
     uint32_t vpls; // slots, 0 to 2,500,000
     uint32_t bounces; // indirect bounces, 1 to 8
     float alpha; // r_l = alpha * h_l; > 0
@@ -34,7 +38,10 @@ typedef struct render_settings {
     uint32_t seed;
     bool auto_exposure;
     float exposure; // EV, when not automatic
-    uint32_t frames; // rendered; the last is written
+    uint32_t frames; // rendered; the last is written. The progressive methods (path, vpl) take as many as they need
+    uint32_t spp; // path: samples per pixel at most
+    float until; // path: stops at this estimated relative error; 0: never
+    uint32_t ir_vpls; // ir: slots for VPLs, in place of `vpls`
 } render_settings;
 
 render_settings render_settings_default(void);

@@ -22,18 +22,19 @@ static void vpl_trace_execute(const frame_graph_context *context, void *user)
 
 static void vpl_trace_setup(renderer *r, void *state)
 {
-    if (!renderer_has_indirect(r))
+    if (!renderer_has_vpls(r))
         return;
     vpl_trace *pass = state;
     const render_settings *s = &r->settings;
-    pass->push.path_count = max_u32(1, s->vpls / s->bounces);
-    pass->push.slot_count = s->vpls;
+    const uint32_t slots = renderer_vpl_slots(r);
+    pass->push.path_count = max_u32(1, slots / s->bounces);
+    pass->push.slot_count = slots;
     pass->push.bounces = s->bounces;
     frame_graph_pass *p = frame_graph_pass_add(
         r->graph, &(frame_graph_pass_desc){
                       .name = "vpl_trace", .kind = FRAME_GRAPH_COMPUTE, .execute = vpl_trace_execute, .user = pass});
     frame_graph_read(p, "tlas", ACCESS_TRACE);
-    const frame_graph_resource_desc vpls = frame_graph_buffer_of((uint64_t)s->vpls * sizeof(vpl));
+    const frame_graph_resource_desc vpls = frame_graph_buffer_of((uint64_t)slots * sizeof(vpl));
     frame_graph_create_resource(p, "vpls", &vpls, ACCESS_STORAGE_WRITE);
     const frame_graph_resource_desc rays = {.kind = FRAME_GRAPH_BUFFER, .size = 16, .host = true};
     frame_graph_create_resource(p, "rays_vpl", &rays, ACCESS_STORAGE_READ_WRITE);

@@ -136,6 +136,16 @@ SHARED_STRUCT(emissive_triangle) {
     SHARED_VEC2(uv2);
 } SHARED_END(emissive_triangle, 104)
 
+// ---- Rays
+
+#define RAY_MISS 0xffffffffu
+SHARED_STRUCT(ray_hit) {
+    uint instance;  // index into the instances, or RAY_MISS
+    uint geometry;  // the primitive within its mesh
+    uint triangle;  // within the primitive
+    SHARED_VEC2(barycentrics); // weights of its second and third corner
+} SHARED_END(ray_hit, 20)
+
 // ---- Virtual point lights
 
 SHARED_STRUCT(vpl) {

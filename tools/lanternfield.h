@@ -43,6 +43,22 @@ bool path_has_extension(const char *path, const char *extension); // ".png", wit
 // ---- The rendering: lanternfield_render.c.
 int render_run(const render_request *request); // returns the exit code
 
+// A scene on a device, seen as a request asks (scene, camera, eye, target, fov, sun, device, validate; its settings).
+typedef struct render_session {
+    scene_data *scene;
+    gpu *gpu;
+    renderer *renderer;
+} render_session;
+bool render_session_open(render_session *session, const render_request *request); // false: logged; close it all the same
+void render_session_close(render_session *session);
+// Text that names all that a progressive picture depends on but its length: the scene's files by content hash, camera,
+// sun, size and settings. Equal text, equal picture. free() it.
+char *render_identity(const render_session *session, const render_request *request);
+
+// ---- Ctrl-C and SIGTERM: noted, so that what is running can finish and be written; a second one ends the process.
+void interrupt_watch(void);
+bool interrupt_seen(void);
+
 // ---- One line on the terminal that is rewritten, nothing in a pipe: lanternfield_progress.c.
 void progress_begin(void); // from now on log lines do not run into the progress line
 void progress_show(const char *format, ...) __attribute__((format(printf, 1, 2)));

@@ -14,9 +14,7 @@
 // What one run holds.
 typedef struct render_state {
     const render_request *request;
-    scene_data *scene;
-    gpu *gpu;
-    renderer *renderer;
+    render_session session;
     render_times times;
     uint32_t frames_done;
     bool lights_counted; // by the last frame done
@@ -146,10 +144,16 @@ static void interrupt_note(int number)
     interrupted = 1;
 }
 
-static void interrupt_watch(void)
+void interrupt_watch(void)
 {
     const struct sigaction action = {.sa_handler = interrupt_note, .sa_flags = (int)SA_RESETHAND | SA_RESTART};
     sigaction(SIGINT, &action, NULL);
+    sigaction(SIGTERM, &action, NULL);
+}
+
+bool interrupt_seen(void)
+{
+    return interrupted;
 }
 
 // ---- Frames
@@ -195,7 +199,7 @@ static bool aovs_check(const render_state *state)
     for (uint32_t i = 0; i < state->request->aov_count; i++) {
         const struct aov_info *const aov = state->request->aovs[i].aov;
         const bool expected = !aov_counts_lights(aov) || state->lights_counted;
-        if (expected && !aov_present(state->renderer, aov)) {
+        if (expected && !aov_present(state->session.renderer, aov)) {
             log_error("--aov %s: these settings and this scene do not make it", aov_name(aov));
             ok = false;
         }
@@ -217,18 +221,18 @@ static void progress_show_frame(uint32_t frame, uint32_t frames, double seconds_
 // Warns of a black picture, and refuses parts of the picture that are not made, before the other frames are rendered.
 static bool first_frame_check(const render_state *state)
 {
-    if (state->renderer->gpu_world->instance_count == 0) {
-        log_warning("%s: no geometry is in place (nodes scaled to nothing?): the picture will be black", state->scene->path);
-    } else if (state->renderer->gpu_world->light_power <= 0) {
-        log_warning("%s: no lights: the picture will be black", state->scene->path);
+    if (state->session.renderer->gpu_world->instance_count == 0) {
+        log_warning("%s: no geometry is in place (nodes scaled to nothing?): the picture will be black", state->session.scene->path);
+    } else if (state->session.renderer->gpu_world->light_power <= 0) {
+        log_warning("%s: no lights: the picture will be black", state->session.scene->path);
     }
-    levels_check(state->renderer);
+    levels_check(state->session.renderer);
     return aovs_check(state);
 }
 
 static bool frames_render(render_state *state)
 {
-    renderer *const r = state->renderer;
+    renderer *const r = state->session.renderer;
     const uint32_t frames = r->settings.frames;
     const bool wants_count = wants_light_count(state->request);
     const double start = time_now();
@@ -265,13 +269,13 @@ static bool graph_write(const renderer *r, const char *path)
 static bool statistics_write(const render_state *state)
 {
     const render_summary summary = {
-        .scene = state->scene->path,
-        .device = gpu_name(state->gpu),
+        .scene = state->session.scene->path,
+        .device = gpu_name(state->session.gpu),
         .frames = state->frames_done,
         .counting_is_timed = state->lights_counted && state->frames_done == 1,
         .times = &state->times,
     };
-    return stats_write(state->renderer, &summary, state->request->stats);
+    return stats_write(state->session.renderer, &summary, state->request->stats);
 }
 
 // Adds a file to the summary when it was written.
@@ -287,7 +291,7 @@ static bool note_written(arena *names, const char **list, const char *path, bool
 static bool outputs_write(const render_state *state)
 {
     const render_request *const request = state->request;
-    renderer *const r = state->renderer;
+    renderer *const r = state->session.renderer;
     arena names = {0};
     const char *list = "";
     bool ok = true;
@@ -314,7 +318,7 @@ static bool outputs_write(const render_state *state)
     if (*list) {
         printf("wrote %s: %ux%u, %u frame%s, %.1f ms a frame on %s\n", list, r->settings.width, r->settings.height,
                state->frames_done, state->frames_done == 1 ? "" : "s",
-               time_series_percentile(&state->times.frames, 0.5), gpu_name(state->gpu));
+               time_series_percentile(&state->times.frames, 0.5), gpu_name(state->session.gpu));
     }
     arena_fini(&names);
     return ok;
@@ -322,7 +326,7 @@ static bool outputs_write(const render_state *state)
 
 static bool validation_check(const render_state *state)
 {
-    const uint32_t messages = state->request->validate ? gpu_validation_messages(state->gpu) : 0;
+    const uint32_t messages = state->request->validate ? gpu_validation_messages(state->session.gpu) : 0;
     if (messages > 0) {
         log_error("the validation layer reported %u message%s", messages, messages == 1 ? "" : "s");
     }
@@ -331,42 +335,40 @@ static bool validation_check(const render_state *state)
 
 // ---- From nothing to a renderer
 
-static bool render_open(render_state *state)
+bool render_session_open(render_session *session, const render_request *request)
 {
-    const render_request *const request = state->request;
     uint32_t camera;
     progress_show("load %s", request->scene);
-    state->scene = scene_load(request->scene);
-    if (!state->scene || !camera_find(state->scene, request->camera, &camera)) {
+    session->scene = scene_load(request->scene);
+    if (!session->scene || !camera_find(session->scene, request->camera, &camera)) {
         return false;
     }
-    if (state->scene->instanced_triangles == 0) {
+    if (session->scene->instanced_triangles == 0) {
         log_error("%s: no geometry: there is nothing to render", request->scene);
         return false;
     }
     const gpu_desc desc = {.device = request->device, .validation = request->validate};
-    state->gpu = gpu_create(&desc);
-    if (!state->gpu || !memory_check(state->gpu, &request->settings)) {
+    session->gpu = gpu_create(&desc);
+    if (!session->gpu || !memory_check(session->gpu, &request->settings)) {
         return false;
     }
     progress_show("upload %s", request->scene);
-    state->renderer = renderer_create(state->gpu, state->scene, &request->settings);
-    if (!state->renderer || !camera_place(state->renderer, request, camera)) {
+    session->renderer = renderer_create(session->gpu, session->scene, &request->settings);
+    if (!session->renderer || !camera_place(session->renderer, request, camera)) {
         return false;
     }
     if (request->has_sun) {
-        world_sun_add(state->renderer, request->sun, request->sun[3]);
+        world_sun_add(session->renderer, request->sun, request->sun[3]);
     }
-    exports_set(state->renderer, request);
     return true;
 }
 
-static void render_close(render_state *state)
+void render_session_close(render_session *session)
 {
-    renderer_destroy(state->renderer);
-    gpu_destroy(state->gpu);
-    scene_destroy(state->scene);
-    render_times_fini(&state->times);
+    renderer_destroy(session->renderer);
+    gpu_destroy(session->gpu);
+    scene_destroy(session->scene);
+    *session = (render_session){0};
 }
 
 int render_run(const render_request *request)
@@ -376,9 +378,10 @@ int render_run(const render_request *request)
     }
     render_state state = {.request = request};
     progress_begin();
-    bool ok = render_open(&state);
+    bool ok = render_session_open(&state.session, request);
     if (ok) {
         interrupt_watch();
+        exports_set(state.session.renderer, request);
         ok = frames_render(&state) && outputs_write(&state) && validation_check(&state);
     }
     progress_end();
@@ -386,6 +389,7 @@ int render_run(const render_request *request)
         log_info("interrupted after %u of %u frames; what there was is written", state.frames_done,
                  request->settings.frames);
     }
-    render_close(&state);
+    render_session_close(&state.session);
+    render_times_fini(&state.times);
     return !ok ? EXIT_FAILED : interrupted ? EXIT_INTERRUPTED : EXIT_DONE;
 }

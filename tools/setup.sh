@@ -21,7 +21,9 @@ libtinygltf-dev|reading glTF|
 libmeshoptimizer-dev|vertex order|
 libstb-dev|PNG and JPEG|
 libtinyexr-dev|OpenEXR images|
-libcjson-dev|writing statistics|
+libcjson-dev|statistics and suites|
+libembree-dev|rays on the CPU|
+gnuplot-nox|charts|
 '
 
 missing=() backports=()

@@ -1,0 +1,7 @@
+#include "modules.h"
+
+bool vpl_reference_init(renderer *r)
+{
+    (void)r;
+    return true;
+}
