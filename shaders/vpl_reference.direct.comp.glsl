@@ -3,7 +3,7 @@
 #extension GL_GOOGLE_include_directive : require
 #include "scene.glsl.h"
 
-layout(local_size_x = 64) in; // x: pixels in rows from the top
+layout(local_size_x = 128) in; // x: pixels in rows from the top
 layout(set = 0, binding = 0) uniform sampler2D exact_map;
 layout(set = 0, binding = 1) uniform sampler2D sampled_map;
 layout(set = 0, binding = 2, scalar) buffer sums_block { vec4 sums[]; };

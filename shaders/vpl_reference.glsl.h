@@ -5,7 +5,7 @@
 #include "gbuffer.glsl.h"
 #include "lgh_shade.glsl.h"
 
-layout(local_size_x = 64) in; // x: pixels in rows from the top
+layout(local_size_x = 128) in; // x: pixels in rows from the top
 layout(set = 0, binding = 0, scalar) readonly buffer vpls_block { vpl vpls[]; };
 layout(set = 0, binding = 1) uniform sampler2D depth_map;
 layout(set = 0, binding = 2) uniform sampler2D normal_map;
