@@ -157,6 +157,7 @@ typedef struct state_header {
     uint32_t version, width, height, identity_size;
     uint64_t done;
     double rays;
+    double error; // NAN: not known
 } state_header;
 
 static const char state_magic[8] = {'L', 'F', 'S', 'T', 'A', 'T', 'E', '\n'};
@@ -175,6 +176,7 @@ bool progressive_save(renderer *r, const char *path, const char *identity)
         return false;
     }
     rays_collect(r, state);
+    state->error = error_measure(r, state);
     state_header header = {
         .version = STATE_VERSION,
         .width = state->width,
@@ -182,6 +184,7 @@ bool progressive_save(renderer *r, const char *path, const char *identity)
         .identity_size = (uint32_t)strlen(identity),
         .done = state->done,
         .rays = state->rays,
+        .error = state->error,
     };
     memcpy(header.magic, state_magic, sizeof header.magic);
     const size_t sums_at = sizeof header + header.identity_size, hash_at = sums_at + sums_size(state->width, state->height);
@@ -288,6 +291,7 @@ bool progressive_load(renderer *r, const char *path, const char *identity)
         state->loaded = true;
         state->done = header.done;
         state->rays = header.rays;
+        state->error = header.error;
     }
     free(bytes);
     return ok;
