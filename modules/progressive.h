@@ -41,6 +41,7 @@ void progressive_restart(renderer *r);
 // zero where `done` is 0. The method modifies it to "sums", counts what this frame adds, and has the picture made. One
 // storage buffer holds both halves, so where maxStorageBufferRange is 128 MiB pictures have at most 4,194,304 pixels;
 // larger ones fail with a line.
+bool progressive_is_fresh(renderer *r); // this frame begins anew: `done` is 0 before it
 uint64_t progressive_begin(renderer *r, uint64_t total); // imports "sums_before"; returns `done` before this frame
 // This frame adds `count` to `done`; makes "radiance" of "sums" and the two factors. `halves`: sums[0] holds the even
 // samples' and sums[1] the odd ones', counted from 0. With count = 0 "sums" need not exist.
