@@ -339,9 +339,11 @@ static const char *work_print(arena *memory, const render_state *state)
     const char *const error =
         isnan(status->error) ? "" : arena_printf(memory, ", estimated error %.2g %%", 100 * status->error);
     const double rays = progressive_run_rays(&state->progress);
-    const char *const speed = rays > 0 ? arena_printf(memory, ", %.1f Mrays/s", 1e-6 * rays / state->seconds) : "";
+    const char *const speed = status->done > state->progress.before.done
+                                  ? arena_printf(memory, ", %.1f Mrays/s", 1e-6 * rays / state->seconds)
+                                  : "";
     return arena_printf(memory, "%s, %llu %s%s%s, %.1f s%s", method, (unsigned long long)status->done,
-                        r->settings.method == METHOD_PATH ? "sample" : "VPL", status->done == 1 ? "" : "s", error,
+                        r->settings.method == METHOD_PATH ? "sample" : "VPL slot", status->done == 1 ? "" : "s", error,
                         state->seconds, speed);
 }
 
