@@ -76,6 +76,7 @@ void progressive_run_step(progressive_run *run, renderer *r);
 void progressive_run_end(progressive_run *run, renderer *r);
 void progressive_run_fini(progressive_run *run);
 double progressive_run_rays(const progressive_run *run); // traced by this run
+const char *progressive_run_unit(const renderer *r, uint64_t count); // "samples", "VPL slot"
 
 // ---- Ctrl-C and SIGTERM: noted, so that what is running can finish and be written; a second one ends the process.
 void interrupt_watch(void);

@@ -34,6 +34,12 @@ double progressive_run_rays(const progressive_run *run)
     return run->now.rays - run->before.rays;
 }
 
+const char *progressive_run_unit(const renderer *r, uint64_t count)
+{
+    const bool is_path = r->settings.method == METHOD_PATH;
+    return count == 1 ? (is_path ? "sample" : "VPL slot") : (is_path ? "samples" : "VPL slots");
+}
+
 // ---- The state
 
 static void state_save(progressive_run *run, renderer *r)
@@ -80,8 +86,8 @@ static void progress_print(const progressive_run *run, const renderer *r)
         snprintf(left, sizeof(left), seconds < 90 ? "  %.0f s left" : "  %.0f min left",
                  seconds < 90 ? seconds : seconds / 60);
     }
-    progress_show("%s %llu/%llu  %.0f %%%s%s", r->settings.method == METHOD_PATH ? "sample" : "VPL",
-                  (unsigned long long)now->done, (unsigned long long)now->total,
+    progress_show("%llu/%llu %s  %.0f %%%s%s", (unsigned long long)now->done, (unsigned long long)now->total,
+                  progressive_run_unit(r, now->total),
                   expected > 0 ? fmin(100, 100 * (double)now->done / expected) : 100, error, left);
 }
 

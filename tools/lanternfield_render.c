@@ -342,9 +342,8 @@ static const char *work_print(arena *memory, const render_state *state)
     const char *const speed = status->done > state->progress.before.done
                                   ? arena_printf(memory, ", %.1f Mrays/s", 1e-6 * rays / state->seconds)
                                   : "";
-    return arena_printf(memory, "%s, %llu %s%s%s, %.1f s%s", method, (unsigned long long)status->done,
-                        r->settings.method == METHOD_PATH ? "sample" : "VPL slot", status->done == 1 ? "" : "s", error,
-                        state->seconds, speed);
+    return arena_printf(memory, "%s, %llu %s%s, %.1f s%s", method, (unsigned long long)status->done,
+                        progressive_run_unit(r, status->done), error, state->seconds, speed);
 }
 
 // Writes every file, even when another cannot be written, and prints the closing line.
@@ -432,16 +431,17 @@ void render_session_close(render_session *session)
 
 static void interruption_tell(const render_state *state)
 {
+    const renderer *const r = state->session.renderer;
     const render_request *const request = state->request;
     const progressive_status *const status = &state->progress.now;
-    if (!progressive_is(state->session.renderer)) {
+    if (!progressive_is(r)) {
         log_info("interrupted after %u of %u frames; what there was is written", state->frames_done,
                  request->settings.frames);
-    } else {
-        log_info("interrupted after %llu of %llu; what there was is written%s%s", (unsigned long long)status->done,
-                 (unsigned long long)status->total, request->state ? ", and the same command goes on from " : "",
-                 request->state ? request->state : "");
+        return;
     }
+    log_info("interrupted after %llu of %llu %s; what there was is written%s%s", (unsigned long long)status->done,
+             (unsigned long long)status->total, progressive_run_unit(r, status->total),
+             request->state ? ", and the same command goes on from " : "", request->state ? request->state : "");
 }
 
 int render_run(const render_request *request)
