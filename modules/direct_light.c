@@ -18,7 +18,9 @@ typedef struct direct_light {
 
 static bool has_direct(const renderer *r)
 {
-    const bool shown = r->settings.only == ONLY_ALL || r->settings.only == ONLY_DIRECT;
+    // Paths bring their own; statistics that ask for its rays would keep it alive.
+    const bool shown = r->settings.method != METHOD_PATH &&
+                       (r->settings.only == ONLY_ALL || r->settings.only == ONLY_DIRECT);
     return shown && r->constants.light_count + r->constants.emitter_count > 0;
 }
 

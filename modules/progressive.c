@@ -164,6 +164,7 @@ typedef struct state_header {
     uint64_t done;
     uint64_t frame; // the renderer's, which keys the random numbers of direct light
     double rays;
+    double error; // NAN: not known
 } state_header;
 
 static const char state_magic[8] = {'L', 'F', 'S', 'T', 'A', 'T', 'E', '\n'};
@@ -182,6 +183,7 @@ bool progressive_save(renderer *r, const char *path, const char *identity)
         return false;
     }
     rays_collect(r, state);
+    state->error = error_measure(r, state);
     state_header header = {
         .version = STATE_VERSION,
         .width = state->width,
@@ -190,6 +192,7 @@ bool progressive_save(renderer *r, const char *path, const char *identity)
         .done = state->done,
         .frame = r->frame,
         .rays = state->rays,
+        .error = state->error,
     };
     memcpy(header.magic, state_magic, sizeof header.magic);
     const size_t sums_at = sizeof header + header.identity_size, hash_at = sums_at + sums_size(state->width, state->height);
@@ -297,6 +300,7 @@ bool progressive_load(renderer *r, const char *path, const char *identity)
         state->done = header.done;
         r->frame = (uint32_t)header.frame;
         state->rays = header.rays;
+        state->error = header.error;
     }
     free(bytes);
     return ok;

@@ -28,7 +28,8 @@ progressive_status progressive_status_get(renderer *r, bool measure);
 // The state as a file, written beside and renamed; a read-back that changes nothing of what follows. `identity` is text
 // that names everything that the sums depend on (scene, camera, settings); loading fails with one logged line when it
 // differs (the first line that does is named), when the file is damaged, or when it is none. Load before a frame, with
-// settings' size set; that frame takes the sums as they are. A state may be continued with another spp or until.
+// settings' size set; that frame takes the sums as they are, and the status before it is that of the state (total 0).
+// A state may be continued with another spp or until.
 // Numbers are stored as the machine has them (little-endian).
 bool progressive_save(renderer *r, const char *path, const char *identity);
 bool progressive_load(renderer *r, const char *path, const char *identity);

@@ -299,5 +299,160 @@ grep -q "interrupted after" "$work/stderr" || fail "interrupted, and does not sa
 { [ -s a.png ] && [ ! -e b.exr ]; } || fail "interrupted: a.png is missing or b.exr is there"
 rm -f ./*
 
+# ---- References: progressive methods, their state files, instant radiosity.
+
+tiny=(--size 64x36)
+path=("${tiny[@]}" --method path)
+two_rooms=$scenes/two_rooms.glb
+
+# number KEY FILE: a number of the statistics, the last of that name
+number() { sed -n "s/^\t*\"$1\":\t\([0-9.e+-]*\),\{0,1\}$/\1/p" "$2" | tail -n 1; }
+
+# background ARGUMENT...: starts a rendering and waits until its frames begin; its id is $process.
+background() {
+  "$lanternfield" render "$@" >"$work/stdout" 2>"$work/stderr" &
+  process=$!
+  # SIGINT is bit 1 of the mask of caught signals.
+  until [[ $(sed -n 's/^SigCgt:\s*//p' /proc/$process/status 2>/dev/null) =~ [2367abef]$ ]]; do
+    kill -0 $process 2>/dev/null || break
+    sleep 0.1
+  done
+}
+
+echo "options that do not fit the method are refused before any work"
+refuses 1 "--state: --method lgh" render no-such.glb --state a.state
+refuses 1 "--state: --method ir" render no-such.glb --method ir --state a.state
+refuses 1 "--until: --method lgh" render no-such.glb --until 0.1
+refuses 1 "--until: --method vpl" render no-such.glb --method vpl --until 0.1
+refuses 1 "--only indirect-unshadowed: --method path" render no-such.glb --method path --only indirect-unshadowed
+for aov in direct indirect shadow-u shadow-s shadow-ratio lights-per-pixel; do
+  refuses 1 "--aov $aov: --method path" render no-such.glb --method path --aov $aov=a.exr
+done
+refuses 1 "--aov indirect: --method vpl" render no-such.glb --method vpl --aov indirect=a.exr
+refuses 1 "--spp" render "$cornell" --method path --spp 0
+refuses 1 "--ir-vpls" render "$cornell" --method ir --ir-vpls 65537
+refuses 2 "lgh, path, vpl, ir" render "$cornell" --method photons
+refuses 1 "missing/a.state" render "$cornell" --method path --state missing/a.state
+refuses 1 "folder.png" render "$cornell" --method path --state "$work/folder.png"
+run render --help
+for option in --method --rays --spp --until --ir-vpls --state; do
+  grep -q -- "^  $option " "$work/stdout" || fail "render --help has no $option"
+done
+
+echo "path"
+renders "$cornell" "${path[@]}" --spp 16 -o a.exr -o a.png --aov albedo=b.exr --aov depth=c.exr --aov normal=d.exr --stats a.json
+grep -q "^wrote a.exr, a.png, b.exr, c.exr, d.exr, a.json: 64x36, path, 16 samples, estimated error [0-9.e+]* %, [0-9.]* s, [0-9.]* Mrays/s on " \
+  "$work/stdout" || fail "closing line: $(cat "$work/stdout")"
+[ ! -s "$work/stderr" ] || fail "path is not quiet in a pipe: $(cat "$work/stderr")"
+for key in method done total finished estimated_error rays seconds mrays_per_second path; do
+  grep -q "\"$key\":" a.json || fail "the statistics of path have no \"$key\""
+done
+[ "$(number done a.json)" = 16 ] && [ "$(number total a.json)" = 16 ] || fail "path: not 16 of 16 samples"
+awk "BEGIN { exit !($(number rays a.json) >= 16 * 64 * 36 / 2 && $(number path a.json) > 0) }" || fail "path: too few rays"
+# Neither --frames nor a setting of another method, nor a second run, changes a byte.
+renders "$cornell" "${path[@]}" --spp 16 --frames 1 --alpha 2 -o again.exr
+cmp a.exr again.exr || fail "path: two runs differ"
+rm -f ./*
+
+echo "path stops at an estimated error, and goes on from there"
+renders "$cornell" "${path[@]}" --spp 1000000 --until 0.2 --state a.state -o a.exr --stats a.json
+done=$(number done a.json)
+awk "BEGIN { exit !($done >= 16 && $done < 1000000 && $(number estimated_error a.json) <= 0.2) }" ||
+  fail "--until 0.2 stopped after $done samples at an error of $(number estimated_error a.json)"
+grep -q '"finished":	true' a.json || fail "--until: not finished"
+cp a.state before.state
+renders "$cornell" "${path[@]}" --spp 1000000 --until 0.2 --state a.state -o again.exr
+cmp a.exr again.exr && cmp a.state before.state || fail "a state that --until finished changed when there was nothing to do"
+renders "$cornell" "${path[@]}" --spp $((done + 5)) --state a.state -o a.exr --stats a.json
+{ [ "$(number done a.json)" = $((done + 5)) ] && [ "$(number done_before a.json)" = "$done" ]; } || fail "a finished state does not go on"
+renders "$cornell" "${path[@]}" --spp 1 --state a.state -o again.exr
+grep -q "path, $((done + 5)) samples, " "$work/stdout" || fail "a state with more samples than asked for: $(cat "$work/stdout")"
+cmp a.exr again.exr || fail "a state with nothing to add makes another picture"
+mv a.state "$work/path.state"
+rm -f ./*
+
+echo "a state that does not fit is refused and left alone"
+state=$work/path.state
+cp "$state" "$work/path.state.before"
+refuses 1 'seed' render "$cornell" "${path[@]}" --seed 2 --state "$state"
+refuses 1 'bounces' render "$cornell" "${path[@]}" --bounces 1 --state "$state"
+refuses 1 'sun' render "$cornell" "${path[@]}" --sun 0,-1,0,10 --state "$state"
+refuses 1 'eye' render "$cornell" "${path[@]}" --eye 1,2,3 --state "$state"
+refuses 1 'geometry' render "$two_rooms" "${path[@]}" --state "$state"
+refuses 1 '65x36' render "$cornell" --method path --size 65x36 --state "$state"
+refuses 1 'path.state' render "$cornell" "${tiny[@]}" --method vpl --state "$state"
+cmp "$state" "$work/path.state.before" || fail "a refused state was changed"
+head -c 5000 "$state" >"$work/cut.state"
+{ head -c 20000 "$state"; printf x; tail -c +20002 "$state"; } >"$work/flipped.state"
+cmp -s "$state" "$work/flipped.state" && fail "the flipped byte is the same"
+echo "not a state" >"$work/text.state"
+: >"$work/empty.state"
+for name in cut flipped text empty; do
+  cp "$work/$name.state" "$work/$name.before"
+  refuses 1 "$name.state" render "$cornell" "${path[@]}" --state "$work/$name.state"
+  cmp "$work/$name.state" "$work/$name.before" || fail "$name.state was changed"
+done
+
+echo "path: what Ctrl-C, SIGTERM and SIGKILL leave goes on to the same bytes as a run that nobody stopped"
+for signal in INT TERM; do
+  background "$cornell" "${path[@]}" --spp 10000000 --state a.state -o a.exr
+  sleep 0.5
+  kill -$signal $process
+  wait $process
+  code=$?
+  [ $code = 130 ] || fail "SIG$signal: exit code $code"
+  grep -q "interrupted after .* a.state" "$work/stderr" || fail "SIG$signal: $(cat "$work/stderr")"
+  [ -s a.exr ] || fail "SIG$signal: no picture"
+  rm -f a.exr
+done
+background "$cornell" "${path[@]}" --spp 10000000 --state a.state -o a.exr
+before=$(stat -c %Y%i a.state)
+for _ in $(seq 300); do
+  [ "$(stat -c %Y%i a.state)" != "$before" ] && break
+  sleep 0.1
+done
+kill -KILL $process
+wait $process 2>/dev/null
+[ "$(stat -c %Y%i a.state)" != "$before" ] || fail "the state was not saved within 30 s"
+[ ! -e a.exr ] || fail "SIGKILL: a picture that is not finished"
+renders "$cornell" "${path[@]}" --spp 1 --state a.state -o a.exr --stats a.json
+done=$(number done a.json)
+renders "$cornell" "${path[@]}" --spp $((done + 7)) --state a.state -o a.exr --stats a.json
+{ [ "$done" -gt 1 ] && [ "$(number done_before a.json)" = "$done" ] && [ "$(number done a.json)" = $((done + 7)) ]; } ||
+  fail "SIGKILL: $done samples, then $(number done_before a.json) and $(number done a.json)"
+renders "$cornell" "${path[@]}" --spp $((done + 7)) --state b.state -o b.exr
+cmp a.exr b.exr || fail "the interrupted path run differs from the other one"
+rm -f ./*
+renders "$cornell" "${path[@]}" --spp 4 -o a.exr
+[ "$(ls)" = a.exr ] || fail "without --state: $(ls)"
+rm -f ./*
+
+echo "vpl and ir"
+vpl=("${tiny[@]}" --method vpl --vpls 600)
+renders "$cornell" "${vpl[@]}" -o a.exr --stats a.json
+grep -q "^wrote a.exr, a.json: 64x36, vpl, 600 VPL slots, [0-9.]* s, [0-9.]* Mrays/s on " "$work/stdout" || fail "closing line: $(cat "$work/stdout")"
+awk "BEGIN { exit !($(number vpls a.json) > 60) }" || fail "vpl: $(number vpls a.json) VPLs"
+background "$cornell" "${vpl[@]}" --state a.state -o b.exr
+kill -INT $process
+wait $process
+code=$?
+[ $code = 130 ] || [ $code = 0 ] || fail "vpl, interrupted: exit code $code"
+renders "$cornell" "${vpl[@]}" --state a.state -o b.exr
+cmp a.exr b.exr || fail "the interrupted vpl run differs from the other one"
+mv a.state "$work/vpl.state"
+rm -f ./*
+refuses 1 "vpls" render "$cornell" "${tiny[@]}" --method vpl --vpls 603 --state "$work/vpl.state"
+refuses 1 "shadows" render "$cornell" "${vpl[@]}" --shadow-samples 0 --state "$work/vpl.state"
+if mountpoint -q "$work/full"; then
+  run render "$cornell" --size 320x180 --method vpl --vpls 0 --state "$work/full/a.state" -o a.exr && fail "a state on a full disk: exit code 0"
+  { [ "$(grep -c error "$work/stderr")" = 1 ] && grep -qF "$work/full/a.state" "$work/stderr"; } || fail "a state on a full disk: $(cat "$work/stderr")"
+  { [ -s a.exr ] && [ -z "$(ls -A "$work/full")" ]; } || fail "a state on a full disk: no picture, or something is left"
+fi
+rm -f ./*
+renders "$cornell" "${tiny[@]}" --method ir --ir-vpls 30 -o a.exr --stats a.json
+grep -q "^wrote a.exr, a.json: 64x36, 1 frame, " "$work/stdout" || fail "closing line: $(cat "$work/stdout")"
+awk "BEGIN { exit !($(number vpls a.json) > 0 && $(number vpls a.json) <= 30) }" || fail "ir: $(number vpls a.json) VPLs"
+rm -f ./*
+
 echo "$failures failed"
 [ $failures = 0 ]
