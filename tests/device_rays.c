@@ -2,6 +2,7 @@
 //
 //     device_rays                      the tests
 //     device_rays bench SCENE [RAYS]   millions of shadow rays per second: by query, by Embree, and by Embree alone
+#include "engine/gpu_internal.h"
 #include "engine/parallel.h"
 #include "modules/rays.h"
 #include "modules/world.h"
@@ -590,14 +591,54 @@ TEST(only_the_structure_that_is_traced_is_built)
     renderer_destroy(r);
 }
 
-TEST(auto_is_embree_on_a_cpu_and_query_elsewhere)
+static char last_error[256];
+static uint32_t errors;
+
+static void error_keep(log_level level, const char *line, void *user)
+{
+    (void)user;
+    if (level == LOG_ERROR) {
+        errors++;
+        snprintf(last_error, sizeof last_error, "%s", line);
+    }
+}
+
+// Any device that is not a CPU will do, and this one can say so.
+TEST(embree_is_refused_where_the_device_is_not_a_cpu)
+{
+    const VkPhysicalDeviceType type = device->properties.deviceType;
+    device->properties.deviceType = VK_PHYSICAL_DEVICE_TYPE_DISCRETE_GPU;
+    quad_scene s;
+    quad_scene_init(&s);
+    quad_add(&s, IDENTITY);
+    renderer *r = renderer_of(&s.data);
+    const ray down = {{0, 0, 2}, 4, {0, 0, -1}, 0};
+    answers a = trace(r, RAYS_QUERY, &down, 1);
+    CHECK(a.hits[0].instance == 0);
+    answers_free(&a);
+    r->settings.rays = RAYS_EMBREE;
+    errors = 0;
+    log_sink_set(error_keep, NULL);
+    CHECK(!renderer_frame(r));
+    log_sink_set(NULL, NULL);
+    CHECK(errors == 1 && strstr(last_error, "--rays embree") && strstr(last_error, gpu_name(device)));
+    r->settings.rays = RAYS_AUTO;
+    CHECK(renderer_frame(r) && !rays_are_host(r) && pass_ran(r, "acceleration"));
+    renderer_destroy(r);
+    device->properties.deviceType = type;
+}
+
+TEST(auto_is_embree_where_the_device_is_a_cpu)
 {
     quad_scene s;
     quad_scene_init(&s);
     quad_add(&s, IDENTITY);
     renderer *r = renderer_of(&s.data);
+    const ray down = {{0, 0, 2}, 4, {0, 0, -1}, 0};
+    answers a = trace(r, RAYS_QUERY, &down, 1);
+    answers_free(&a);
     r->settings.rays = RAYS_AUTO;
-    CHECK(rays_are_host(r) == gpu_is_cpu(device));
+    CHECK(renderer_frame(r) && rays_are_host(r) && pass_ran(r, "rays/scene"));
     renderer_destroy(r);
 }
 
@@ -606,13 +647,191 @@ TEST(the_validation_layer_is_silent)
     CHECK(gpu_validation_messages(device) == 0);
 }
 
-int main(void)
+// ---- The bench
+
+typedef struct bare { // Embree alone, over opaque copies of the same two levels
+    RTCDevice device;
+    RTCScene scene;
+    struct RTCRay *rays;
+} bare;
+
+static RTCScene bare_mesh(RTCDevice device, const scene_data *s, const scene_mesh *mesh)
 {
-    device = gpu_create(&(gpu_desc){.validation = true});
+    RTCScene scene = rtcNewScene(device);
+    for (uint32_t i = 0; i < mesh->primitive_count; i++) {
+        const mesh_primitive *p = &s->primitives[mesh->first_primitive + i];
+        RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
+        void *positions = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
+                                                  sizeof *s->positions, p->vertex_count);
+        memcpy(positions, s->positions + p->first_vertex, p->vertex_count * sizeof *s->positions);
+        void *indices = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
+                                                3 * sizeof *s->indices, p->index_count / 3);
+        memcpy(indices, s->indices + p->first_index, p->index_count * sizeof *s->indices);
+        rtcCommitGeometry(geometry);
+        rtcAttachGeometry(scene, geometry);
+        rtcReleaseGeometry(geometry);
+    }
+    rtcCommitScene(scene);
+    return scene;
+}
+
+static void bare_build(bare *b, const scene_data *s)
+{
+    b->device = rtcNewDevice(NULL);
+    b->scene = rtcNewScene(b->device);
+    RTCScene *meshes = memory_alloc(s->mesh_count * sizeof *meshes);
+    for (uint32_t i = 0; i < s->mesh_count; i++)
+        meshes[i] = bare_mesh(b->device, s, &s->meshes[i]);
+    for (uint32_t i = 0; i < s->node_count; i++) {
+        if (s->nodes[i].mesh == SCENE_NONE)
+            continue;
+        RTCGeometry geometry = rtcNewGeometry(b->device, RTC_GEOMETRY_TYPE_INSTANCE);
+        rtcSetGeometryInstancedScene(geometry, meshes[s->nodes[i].mesh]);
+        rtcSetGeometryTransform(geometry, 0, RTC_FORMAT_FLOAT4X4_COLUMN_MAJOR, s->nodes[i].world);
+        rtcCommitGeometry(geometry);
+        rtcAttachGeometry(b->scene, geometry);
+        rtcReleaseGeometry(geometry);
+    }
+    rtcCommitScene(b->scene);
+    for (uint32_t i = 0; i < s->mesh_count; i++)
+        rtcReleaseScene(meshes[i]);
+    free(meshes);
+}
+
+static void bare_run(uint32_t begin, uint32_t end, void *user)
+{
+    const bare *b = user;
+    struct RTCIntersectContext context;
+    rtcInitIntersectContext(&context);
+    for (uint32_t i = begin; i < end; i++)
+        rtcOccluded1(b->scene, &context, &b->rays[i]);
+}
+
+static double bare_milliseconds(const bare *b, parallel *pool, const ray *rays, uint32_t count)
+{
+    for (uint32_t i = 0; i < count; i++) {
+        const float *o = rays[i].origin, *d = rays[i].direction;
+        b->rays[i] = (struct RTCRay){.org_x = o[0],
+                                     .org_y = o[1],
+                                     .org_z = o[2],
+                                     .dir_x = d[0],
+                                     .dir_y = d[1],
+                                     .dir_z = d[2],
+                                     .tfar = rays[i].reach,
+                                     .mask = ~0u};
+    }
+    const double start = time_now();
+    parallel_for(pool, count, 1024, bare_run, (void *)b);
+    return (time_now() - start) * 1e3;
+}
+
+static double pass_milliseconds(const renderer *r, const char *name)
+{
+    uint32_t count;
+    const frame_graph_timing *timings = frame_graph_timings(r->graph, &count);
+    for (uint32_t i = 0; i < count; i++)
+        if (strcmp(timings[i].name, name) == 0)
+            return timings[i].milliseconds;
+    return 0;
+}
+
+// From where one random ray ends to where another does, as from a pixel to a VPL; in no order.
+static void shadow_rays(renderer *r, ray *rays, uint32_t count)
+{
+    ray *searching = random_rays(r->scene, 2 * count);
+    for (uint32_t i = 0; i < 2 * count; i++)
+        searching[i].reach = 1e30f;
+    answers a = trace(r, RAYS_EMBREE, searching, 2 * count);
+    for (uint32_t i = 0; i < count; i++) {
+        float ends[2][3], square = 0;
+        for (uint32_t k = 0; k < 2; k++) {
+            const ray *from = &searching[2 * i + k];
+            const ray_hit *hit = &a.hits[2 * i + k];
+            const double reach = hit->instance == RAY_MISS ? 1 : 0.999 * hit_distance(r, from, hit);
+            for (int axis = 0; axis < 3; axis++)
+                ends[k][axis] = from->origin[axis] + (float)reach * from->direction[axis];
+        }
+        for (int axis = 0; axis < 3; axis++) {
+            rays[i].origin[axis] = ends[0][axis];
+            rays[i].direction[axis] = ends[1][axis] - ends[0][axis];
+            square += rays[i].direction[axis] * rays[i].direction[axis];
+        }
+        rays[i].reach = 0.9999f * sqrtf(square);
+        for (int axis = 0; axis < 3; axis++)
+            rays[i].direction[axis] /= sqrtf(square);
+    }
+    answers_free(&a);
+    free(searching);
+}
+
+static int compare_doubles(const void *left, const void *right)
+{
+    const double a = *(const double *)left, b = *(const double *)right;
+    return (a > b) - (a < b);
+}
+
+static double median(double *values, size_t count)
+{
+    qsort(values, count, sizeof *values, compare_doubles);
+    return values[count / 2];
+}
+
+static int print_bench(const char *path, uint32_t count)
+{
+    enum { REPEATS = 9 };
+    scene_data *scene = scene_load(path);
+    if (!scene)
+        return EXIT_FAILURE;
+    renderer *r = renderer_of(scene);
+    parallel *pool = parallel_create(0);
+    bare b = {.rays = aligned_alloc(16, count * sizeof *b.rays)};
+    bare_build(&b, scene);
+    ray *rays = memory_alloc(count * sizeof *rays);
+    shadow_rays(r, rays, count);
+    double query[REPEATS], embree[REPEATS], alone[REPEATS], visible = 0;
+    for (int i = 0; i < REPEATS; i++) { // in turns, so that what else runs hits all alike
+        answers a = trace(r, RAYS_QUERY, rays, count);
+        query[i] = pass_milliseconds(r, "seen/trace");
+        answers_free(&a);
+        a = trace(r, RAYS_EMBREE, rays, count);
+        embree[i] = pass_milliseconds(r, "seen/trace");
+        alone[i] = bare_milliseconds(&b, pool, rays, count);
+        visible = 0;
+        for (uint32_t k = 0; k < count; k++)
+            visible += a.visible[k];
+        answers_free(&a);
+    }
+    const double scale = 1e-3 * count, query_rate = scale / median(query, REPEATS),
+                 embree_rate = scale / median(embree, REPEATS), alone_rate = scale / median(alone, REPEATS);
+    printf("%s, %u shadow rays, %.1f %% visible, %u threads; Mray/s, median of %d\n", path, count,
+           100 * visible / count, parallel_threads(pool), REPEATS);
+    printf("query %.2f, embree %.2f (%.1f times query), embree alone, opaque %.2f (in the renderer %.2f of it)\n",
+           query_rate, embree_rate, embree_rate / query_rate, alone_rate, embree_rate / alone_rate);
+    free(rays);
+    free(b.rays);
+    rtcReleaseScene(b.scene);
+    rtcReleaseDevice(b.device);
+    parallel_destroy(pool);
+    renderer_destroy(r);
+    scene_destroy(scene);
+    return EXIT_SUCCESS;
+}
+
+int main(int argc, char **argv)
+{
+    const bool bench = argc >= 3 && strcmp(argv[1], "bench") == 0;
+    device = gpu_create(&(gpu_desc){.validation = !bench});
     if (!device) {
         printf("skipped: no device with the validation layer\n");
         return 77;
     }
+    if (!gpu_is_cpu(device)) {
+        printf("skipped: %s is not a CPU, so that there is no Embree to compare with\n", gpu_name(device));
+        gpu_destroy(device);
+        return 77;
+    }
+    if (bench)
+        return print_bench(argv[2], argc > 3 ? (uint32_t)strtoul(argv[3], NULL, 10) : 230400);
     RUN(rays_find_the_nearest_quad_within_their_reach);
     RUN(both_find_the_same_in_scenes);
     RUN(alpha_masks_let_the_same_rays_through);
@@ -622,7 +841,8 @@ int main(void)
     RUN(an_empty_batch_is_traced);
     RUN(embree_gives_the_same_bytes_every_time);
     RUN(only_the_structure_that_is_traced_is_built);
-    RUN(auto_is_embree_on_a_cpu_and_query_elsewhere);
+    RUN(embree_is_refused_where_the_device_is_not_a_cpu);
+    RUN(auto_is_embree_where_the_device_is_a_cpu);
     RUN(the_validation_layer_is_silent);
     gpu_destroy(device);
     return test_end();
