@@ -754,11 +754,18 @@ static void pass_keep(compiler *c, uint32_t index)
     }
 }
 
+// What is written to an import stays after the frame; acceleration structures are built anew before they are traced.
+static bool version_outlives_frame(const compiler *c, uint32_t v)
+{
+    return c->versions[v].exported ||
+           (version_is_imported(c, v) && version_desc(c, v)->kind != FRAME_GRAPH_ACCELERATION);
+}
+
 static bool pass_has_effect(const compiler *c, const node *pass)
 {
     for (uint32_t u = pass->first_use; u < pass->end_use; u++) {
         const uint32_t v = c->uses[u].makes;
-        if (v != NONE && (c->versions[v].exported || version_is_imported(c, v))) {
+        if (v != NONE && version_outlives_frame(c, v)) {
             return true;
         }
     }

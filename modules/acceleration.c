@@ -1,4 +1,4 @@
-// The top-level acceleration structure over the instances, rebuilt every frame.
+// The top-level acceleration structure over the instances, rebuilt in every frame that traces it.
 #include "modules.h"
 #include "world.h"
 

@@ -1,21 +1,31 @@
 // The tracing passes of ray batches: see rays.h.
 #include "rays.h"
+#include "embree_rays.h"
 #include "modules.h"
+#include "world.h"
 
 #include "lanternfield_renderer_shaders.h"
 
 #include <stdio.h>
 
+enum { NAME_SIZE = 64 };
+
 typedef struct rays_state {
     gpu_pipeline pipelines[2]; // by rays_kind
+    embree_rays *embree; // made when first needed
+    bool no_embree; // it could not be made
 } rays_state;
 
-typedef struct rays_pass {
-    gpu_pipeline pipeline;
+typedef struct rays_pass { // of a tracing pass
+    rays_kind kind;
     uint32_t count;
+    gpu_pipeline pipeline;
+    embree_rays *embree;
+    char origins[NAME_SIZE], directions[NAME_SIZE], answers[NAME_SIZE];
 } rays_pass;
 
-enum { NAME_SIZE = 64 };
+// Host passes that trace read it: they come after the pass that lets Embree follow the instances.
+static const char scene_token[] = "rays_scene";
 
 static void name_print(char name[NAME_SIZE], const char *batch, const char *suffix)
 {
@@ -24,11 +34,18 @@ static void name_print(char name[NAME_SIZE], const char *batch, const char *suff
     (void)length;
 }
 
+static rays_state *state_of(const renderer *r)
+{
+    return ((render_pass *)ecs_get(r->world, renderer_pass_find(r, "rays"), r->pass))->state;
+}
+
 bool rays_are_host(const renderer *r)
 {
-    (void)r;
-    return false;
+    const bool possible = gpu_is_cpu(r->gpu) && !state_of(r)->no_embree;
+    return possible && r->settings.rays != RAYS_QUERY;
 }
+
+// ---- Batches
 
 uint32_t rays_layers(const renderer *r, uint32_t wanted)
 {
@@ -39,7 +56,7 @@ uint32_t rays_layers(const renderer *r, uint32_t wanted)
 
 static frame_graph_resource_desc batch_buffer(const renderer *r, uint32_t count, uint64_t item_size)
 {
-    frame_graph_resource_desc desc = frame_graph_buffer_of(count * item_size);
+    frame_graph_resource_desc desc = frame_graph_buffer_of(max_u32(count, 1) * item_size);
     desc.host = rays_are_host(r);
     return desc;
 }
@@ -67,47 +84,109 @@ void rays_modify(renderer *r, frame_graph_pass *pass, const char *from, const ch
     }
 }
 
+// ---- Tracing
+
 static void query_execute(const frame_graph_context *context, void *user)
 {
     const rays_pass *pass = user;
     frame_graph_bind(context, pass->pipeline);
     gpu_push(context->commands, &pass->count, sizeof pass->count);
-    gpu_dispatch(context->commands, div_up_u32(pass->count, 128), 1, 1); // 64 would be one group too many for RAYS_BATCH
+    gpu_dispatch(context->commands, div_up_u32(pass->count, 128), 1,
+                 1); // 64 would be one group too many for RAYS_BATCH
+}
+
+static void *mapping_of(const frame_graph_context *context, const char *name)
+{
+    return gpu_buffer_map(context->gpu, frame_graph_buffer(context, name));
+}
+
+static void embree_execute(const frame_graph_context *context, void *user)
+{
+    const rays_pass *pass = user;
+    const float(*origins)[4] = mapping_of(context, pass->origins);
+    const float(*directions)[4] = mapping_of(context, pass->directions);
+    void *answers = mapping_of(context, pass->answers);
+    if (pass->kind == RAYS_NEAREST)
+        embree_rays_nearest(pass->embree, origins, directions, answers, pass->count);
+    else
+        embree_rays_visible(pass->embree, origins, directions, answers, pass->count);
 }
 
 void rays_trace(renderer *r, const char *batch, rays_kind kind, uint32_t count)
 {
-    const rays_state *state = ((render_pass *)ecs_get(r->world, renderer_pass_find(r, "rays"), r->pass))->state;
+    const rays_state *state = state_of(r);
+    const bool host = rays_are_host(r);
+    rays_pass args = {.kind = kind, .count = count, .pipeline = state->pipelines[kind], .embree = state->embree};
+    name_print(args.origins, batch, "_origins");
+    name_print(args.directions, batch, "_directions");
+    name_print(args.answers, batch, kind == RAYS_NEAREST ? "_hits" : "_visible");
     char name[NAME_SIZE];
     name_print(name, batch, "/trace");
-    const rays_pass args = {state->pipelines[kind], count};
-    frame_graph_pass *pass = frame_graph_pass_add(r->graph, &(frame_graph_pass_desc){
-                                                                .name = name,
-                                                                .kind = FRAME_GRAPH_COMPUTE,
-                                                                .execute = query_execute,
-                                                                .user = (void *)&args,
-                                                                .user_size = sizeof args,
-                                                            });
-    frame_graph_read(pass, "tlas", ACCESS_TRACE);
-    name_print(name, batch, "_origins");
-    frame_graph_read(pass, name, ACCESS_STORAGE_READ);
-    name_print(name, batch, "_directions");
-    frame_graph_read(pass, name, ACCESS_STORAGE_READ);
-    const frame_graph_resource_desc desc =
+    const frame_graph_pass_desc desc = {
+        .name = name,
+        .kind = host ? FRAME_GRAPH_HOST : FRAME_GRAPH_COMPUTE,
+        .execute = host ? embree_execute : query_execute,
+        .user = &args,
+        .user_size = sizeof args,
+    };
+    frame_graph_pass *pass = frame_graph_pass_add(r->graph, &desc);
+    frame_graph_read(pass, host ? scene_token : "tlas", host ? ACCESS_HOST_READ : ACCESS_TRACE);
+    frame_graph_read(pass, args.origins, host ? ACCESS_HOST_READ : ACCESS_STORAGE_READ);
+    frame_graph_read(pass, args.directions, host ? ACCESS_HOST_READ : ACCESS_STORAGE_READ);
+    const frame_graph_resource_desc answers =
         batch_buffer(r, count, kind == RAYS_NEAREST ? sizeof(ray_hit) : sizeof(uint32_t));
-    name_print(name, batch, kind == RAYS_NEAREST ? "_hits" : "_visible");
-    frame_graph_create_resource(pass, name, &desc, ACCESS_STORAGE_WRITE);
+    frame_graph_create_resource(pass, args.answers, &answers, host ? ACCESS_HOST_WRITE : ACCESS_STORAGE_WRITE);
 }
 
-static void rays_setup(renderer *r, void *state)
+// ---- The scene for Embree
+
+static void scene_update(const frame_graph_context *context, void *user)
 {
-    (void)r, (void)state; // only other modules add passes
+    (void)context;
+    renderer *r = user;
+    const world_gpu *w = r->gpu_world;
+    r->failed |= !embree_rays_update(state_of(r)->embree, w->instance_data, w->instance_count);
 }
 
-static void rays_fini(renderer *r, void *state)
+// False where --rays asks for what cannot be had (logged).
+static bool embree_require(renderer *r, rays_state *state)
 {
+    const bool asked = r->settings.rays == RAYS_EMBREE;
+    if (asked && !gpu_is_cpu(r->gpu)) {
+        log_error("--rays embree: traces in the memory of the CPU, and %s is not a CPU; expected auto or query",
+                  gpu_name(r->gpu));
+        return false;
+    }
+    if (rays_are_host(r) && !state->embree) {
+        const world_gpu *w = r->gpu_world;
+        state->embree = embree_rays_create(r->scene, gpu_buffer_map(r->gpu, w->positions),
+                                           gpu_buffer_map(r->gpu, w->indices), asked ? LOG_ERROR : LOG_INFO);
+        state->no_embree = !state->embree;
+    }
+    return !asked || !state->no_embree;
+}
+
+static void rays_setup(renderer *r, void *user)
+{
+    if (!embree_require(r, user)) {
+        r->failed = true;
+        return;
+    }
+    if (!rays_are_host(r))
+        return;
+    frame_graph_pass *pass = frame_graph_pass_add(
+        r->graph,
+        &(frame_graph_pass_desc){.name = "rays/scene", .kind = FRAME_GRAPH_HOST, .execute = scene_update, .user = r});
+    const frame_graph_resource_desc token = {.kind = FRAME_GRAPH_BUFFER, .size = 16, .host = true};
+    frame_graph_create_resource(pass, scene_token, &token, ACCESS_HOST_WRITE);
+}
+
+static void rays_fini(renderer *r, void *user)
+{
+    rays_state *state = user;
+    embree_rays_destroy(state->embree);
     for (uint32_t kind = 0; kind < 2; kind++)
-        gpu_pipeline_destroy(r->gpu, ((rays_state *)state)->pipelines[kind]);
+        gpu_pipeline_destroy(r->gpu, state->pipelines[kind]);
 }
 
 bool rays_init(renderer *r)

@@ -139,7 +139,7 @@ static void frame_render(ecs_world *world, void *user)
     frame_graph_export(r->graph, "display", ACCESS_TRANSFER_READ);
     for (uint32_t i = 0; i < r->export_count; i++)
         frame_graph_export(r->graph, r->exports[i], ACCESS_TRANSFER_READ);
-    r->failed = !frame_graph_execute(r->graph);
+    r->failed |= !frame_graph_execute(r->graph);
 }
 
 // ---- Passes

@@ -11,7 +11,7 @@
 // Names in the frame graph (images are width x height unless said otherwise; light is "radiance over albedo": what a
 // white Lambertian surface would send out, in nits, so that radiance = albedo * light):
 //
-//   tlas               acceleration  the scene                                         acceleration
+//   tlas               acceleration  the scene, for ray queries                        acceleration
 //   vpls               vpl[vpls]                                     vpl_trace; vpl_reference where it keeps them
 //   lgh_header         lgh_header                                                      lgh_build
 //   lgh_lights         grid_light[]  merged, top level first                           lgh_build

@@ -36,6 +36,7 @@ typedef struct world_instance {
 
 typedef struct world_gpu {
     component_type node, transform, mesh, light;
+    // Where the device is a CPU, `positions` and `indices` are mapped, for Embree.
     gpu_buffer frame, positions, attributes, indices, primitives, instances, materials, lights, emitters, light_cdf;
     gpu_buffer tlas_instances; // VkAccelerationStructureInstanceKHR[instance_count], host
     gpu_acceleration *blas; // per mesh; {0} for meshes without triangles

@@ -1,5 +1,6 @@
 // The light sources as the GPU sees them: punctual lights, emissive triangles in the world, and the distribution by
 // which light paths choose among them, in proportion to power.
+#include "texture_sample.h"
 #include "world.h"
 
 #include <math.h>
@@ -35,31 +36,11 @@ static float srgb_decode(float value)
     return value <= 0.04045f ? value / 12.92f : powf((value + 0.055f) / 1.055f, 2.4f);
 }
 
-static uint32_t texel_wrap(float coordinate, uint32_t size, int gl_wrap)
-{
-    enum { GL_CLAMP_TO_EDGE = 33071, GL_MIRRORED_REPEAT = 33648 };
-    float unit = coordinate - floorf(coordinate);
-    if (gl_wrap == GL_CLAMP_TO_EDGE)
-        unit = fminf(fmaxf(coordinate, 0), 1);
-    else if (gl_wrap == GL_MIRRORED_REPEAT && fmodf(floorf(coordinate), 2) != 0)
-        unit = 1 - unit;
-    return min_u32((uint32_t)(unit * (float)size), size - 1);
-}
-
-static void uv_transform(const texture_reference *reference, const vertex_attributes *a, float uv[2])
-{
-    const float *from = reference->uv_set == 0 ? a->uv0 : a->uv1;
-    const float *m = reference->transform;
-    uv[0] = m[0] * from[0] + m[2] * from[1] + reference->offset[0];
-    uv[1] = m[1] * from[0] + m[3] * from[1] + reference->offset[1];
-}
-
 // Mean of the texture over the triangle, by the texels at fixed points of the R2 sequence (Roberts 2018).
 static void texture_mean(const scene_data *s, const scene_texture *texture, const float decode[256],
                          const float uv[3][2], float mean[3])
 {
     enum { POINTS = 64 };
-    const scene_image *image = &s->images[texture->image];
     memset(mean, 0, 3 * sizeof(float));
     for (int i = 0; i < POINTS; i++) {
         float b = fmodf(0.5f + 0.7548776662f * (float)i, 1), c = fmodf(0.5f + 0.5698402910f * (float)i, 1);
@@ -67,11 +48,10 @@ static void texture_mean(const scene_data *s, const scene_texture *texture, cons
             b = 1 - b;
             c = 1 - c;
         }
-        const float u = uv[0][0] + b * (uv[1][0] - uv[0][0]) + c * (uv[2][0] - uv[0][0]);
-        const float v = uv[0][1] + b * (uv[1][1] - uv[0][1]) + c * (uv[2][1] - uv[0][1]);
-        const uint32_t x = texel_wrap(u, image->width, texture->wrap_s);
-        const uint32_t y = texel_wrap(v, image->height, texture->wrap_t);
-        const uint8_t *texel = &image->texels[4 * ((size_t)y * image->width + x)];
+        float point[2];
+        for (int k = 0; k < 2; k++)
+            point[k] = uv[0][k] + b * (uv[1][k] - uv[0][k]) + c * (uv[2][k] - uv[0][k]);
+        const uint8_t *texel = texture_texel(s, texture, point);
         for (int k = 0; k < 3; k++)
             mean[k] += decode[texel[k]] / POINTS;
     }
@@ -86,7 +66,7 @@ static void triangle_vertices(const scene_data *s, const mesh_primitive *p, uint
 static void emissive_uvs(const scene_data *s, const material *m, const uint32_t vertices[3], float uv[3][2])
 {
     for (int k = 0; k < 3; k++)
-        uv_transform(&m->emissive_texture, &s->attributes[vertices[k]], uv[k]);
+        texture_vertex_uv(&m->emissive_texture, &s->attributes[vertices[k]], uv[k]);
 }
 
 // NULL when the primitive's emission does not vary.

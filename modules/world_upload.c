@@ -7,6 +7,20 @@
 
 // ---- Buffers
 
+// On a CPU the geometry stays mapped, so that Embree traces the same memory; it may read 16 bytes past the positions.
+static gpu_buffer geometry_create(gpu *gpu, const gpu_buffer_desc *source)
+{
+    enum { PADDING = 16 };
+    gpu_buffer_desc desc = *source;
+    desc.host = true;
+    desc.size += PADDING;
+    desc.data = NULL;
+    const gpu_buffer buffer = gpu_buffer_create(gpu, &desc);
+    if (buffer.id && source->size)
+        memcpy(gpu_buffer_map(gpu, buffer), source->data, source->size);
+    return buffer;
+}
+
 static bool buffers_upload(renderer *r)
 {
     const scene_data *s = r->scene;
@@ -37,7 +51,8 @@ static bool buffers_upload(renderer *r)
             .usage = uploads[i].usage,
             .data = uploads[i].size ? uploads[i].data : NULL,
         };
-        *uploads[i].buffer = gpu_buffer_create(r->gpu, &desc);
+        const bool mapped = uploads[i].usage == geometry && gpu_is_cpu(r->gpu);
+        *uploads[i].buffer = mapped ? geometry_create(r->gpu, &desc) : gpu_buffer_create(r->gpu, &desc);
         if (!uploads[i].buffer->id)
             return false;
         gpu_scene_bind_buffer(r->gpu, uploads[i].binding, *uploads[i].buffer);

@@ -388,6 +388,15 @@ TEST(modifier_of_an_import_is_never_culled)
     CHECK_STRING(order_text(compile(input), input), "update");
 }
 
+TEST(acceleration_structure_that_nobody_traces_is_not_built)
+{
+    const frame_graph_input *const input = INPUT(PASSES(COMPUTE("build", modify("tlas", "scene", ACCESS_BUILD_WRITE))),
+                                                 IMPORTS({"tlas", STRUCTURE, ACCESS_NONE, ACCESS_NONE}));
+    const frame_graph_plan *const plan = compile(input);
+    CHECK(plan->order_count == 0 && plan->culled_count == 1);
+    CHECK_STRING(plan->culled[0].why, "Pass \"build\" is culled: nobody reads \"scene\".");
+}
+
 TEST(history_alone_keeps_no_pass_alive)
 {
     // The pass reads only what it made itself.
@@ -1244,6 +1253,7 @@ int main(void)
     RUN(chain_that_nobody_reads_is_culled_as_a_whole);
     RUN(modifier_that_nobody_reads_is_culled_and_the_maker_stays);
     RUN(modifier_of_an_import_is_never_culled);
+    RUN(acceleration_structure_that_nobody_traces_is_not_built);
     RUN(history_alone_keeps_no_pass_alive);
     RUN(history_keeps_its_last_maker_alive);
     RUN(first_alternative_with_a_maker_is_meant);

@@ -1,0 +1,802 @@
+// Rays in batches: both tracers find what the geometry says, and the same in scenes.
+//
+//     device_rays                      the tests
+//     device_rays bench SCENE [RAYS]   millions of shadow rays per second: by query, by Embree, and by Embree alone
+#include "engine/parallel.h"
+#include "modules/rays.h"
+#include "modules/world.h"
+#include "quad_scene.h"
+#include "test.h"
+
+#include "test_shaders_shaders.h"
+
+#include <embree3/rtcore.h>
+#include <unistd.h>
+
+#define SHARED_SCENES "../shared/scenes/"
+#define OWN_SCENES BUILD_DIR "/scenes/"
+
+static gpu *device;
+static const uint32_t tracers[] = {RAYS_QUERY, RAYS_EMBREE};
+
+typedef struct ray {
+    float origin[3], reach, direction[3], unused;
+} ray;
+
+typedef struct answers {
+    ray_hit *hits; // per ray
+    uint32_t *visible;
+} answers;
+
+// ---- A pass of our own: traces a list of rays in two batches, "near" for hits and "seen" for visibility
+
+typedef struct batch_pass {
+    gpu_pipeline pipeline;
+    gpu_buffer list;
+    uint32_t count;
+} batch_pass;
+
+static void batch_execute(const frame_graph_context *context, void *user)
+{
+    const batch_pass *pass = user;
+    frame_graph_bind(context, pass->pipeline);
+    gpu_push(context->commands, &pass->count, sizeof pass->count);
+    gpu_dispatch(context->commands, div_up_u32(pass->count, 64), 1, 1);
+}
+
+static void batch_make(renderer *r, batch_pass *state, const char *batch, rays_kind kind)
+{
+    frame_graph_pass *pass = frame_graph_pass_add(
+        r->graph,
+        &(frame_graph_pass_desc){.name = batch, .kind = FRAME_GRAPH_COMPUTE, .execute = batch_execute, .user = state});
+    frame_graph_read(pass, "list", ACCESS_STORAGE_READ);
+    rays_create(r, pass, batch, state->count);
+    rays_trace(r, batch, kind, state->count);
+}
+
+static void batch_setup(renderer *r, void *user)
+{
+    batch_pass *state = user;
+    frame_graph_import_buffer(r->graph, "list", state->list, ACCESS_HOST_WRITE, ACCESS_NONE);
+    batch_make(r, state, "near", RAYS_NEAREST);
+    batch_make(r, state, "seen", RAYS_VISIBLE);
+}
+
+static void batch_fini(renderer *r, void *user)
+{
+    batch_pass *state = user;
+    gpu_pipeline_destroy(r->gpu, state->pipeline);
+    gpu_buffer_destroy(r->gpu, state->list);
+}
+
+// ---- Helpers
+
+static renderer *renderer_of(const scene_data *scene)
+{
+    render_settings settings = render_settings_default();
+    settings.width = settings.height = 16;
+    settings.only = ONLY_INDIRECT; // and no VPLs: nobody else traces
+    settings.vpls = 0;
+    renderer *r = renderer_create(device, scene, &settings);
+    if (!r) {
+        printf("no renderer\n");
+        exit(EXIT_FAILURE);
+    }
+    batch_pass *state = renderer_pass_add(r, "test_batch", sizeof(batch_pass), batch_setup, batch_fini);
+    state->pipeline =
+        gpu_compute_pipeline_create(device, &(gpu_compute_pipeline_desc){.shader = &shader_rays_copy_comp});
+    CHECK(state->pipeline.id != 0);
+    r->exports[r->export_count++] = "near_hits";
+    r->exports[r->export_count++] = "seen_visible";
+    return r;
+}
+
+static void export_read(renderer *r, const char *name, void *data, size_t size)
+{
+    const gpu_buffer buffer = frame_graph_find_buffer(r->graph, name);
+    CHECK(buffer.id && (size == 0 || gpu_buffer_read(device, buffer, 0, data, size)));
+}
+
+// Renders a frame that traces the rays.
+static answers trace(renderer *r, uint32_t tracer, const ray *rays, uint32_t count)
+{
+    batch_pass *state = ((render_pass *)ecs_get(r->world, renderer_pass_find(r, "test_batch"), r->pass))->state;
+    const gpu_buffer_desc desc = {.name = "list",
+                                  .size = count * sizeof *rays,
+                                  .usage = VK_BUFFER_USAGE_STORAGE_BUFFER_BIT,
+                                  .host = true,
+                                  .data = rays};
+    gpu_buffer_destroy(device, state->list);
+    state->list = gpu_buffer_create(device, &desc);
+    state->count = count;
+    r->settings.rays = tracer;
+    CHECK(state->list.id && renderer_frame(r));
+    CHECK(rays_are_host(r) == (tracer == RAYS_EMBREE));
+    const answers a = {memory_alloc(max_u32(count, 1) * sizeof *a.hits),
+                       memory_alloc(max_u32(count, 1) * sizeof *a.visible)};
+    export_read(r, "near_hits", a.hits, count * sizeof *a.hits);
+    export_read(r, "seen_visible", a.visible, count * sizeof *a.visible);
+    return a;
+}
+
+static void answers_free(answers *a)
+{
+    free(a->hits);
+    free(a->visible);
+}
+
+static void matrix_at(float matrix[16], float x, float y, float z)
+{
+    memcpy(matrix, IDENTITY, sizeof IDENTITY);
+    matrix[12] = x;
+    matrix[13] = y;
+    matrix[14] = z;
+}
+
+// ---- Tests
+
+TEST(rays_find_the_nearest_quad_within_their_reach)
+{
+    quad_scene s;
+    quad_scene_init(&s);
+    float matrix[16];
+    for (int i = 0; i < 3; i++) {
+        matrix_at(matrix, 0, 0, -2.0f * (float)i);
+        quad_add(&s, matrix);
+    }
+    renderer *r = renderer_of(&s.data);
+    const ray rays[] = {
+        {{0.5f, -0.25f, 1}, 1e30f, {0, 0, -1}, 0}, // the first quad, lower right triangle
+        {{-0.5f, 0.25f, -1}, 1e30f, {0, 0, -1}, 0}, // the second, upper left triangle
+        {{-0.5f, 0.25f, -3}, 1e30f, {0, 0, 1}, 0}, // the second from behind
+        {{0.5f, 0.25f, 1}, 0.999f, {0, 0, -1}, 0}, // ends before the first
+        {{0.5f, 0.25f, 1}, 1.001f, {0, 0, -1}, 0}, // ends behind it
+        {{1.5f, 0, 1}, 1e30f, {0, 0, -1}, 0}, // beside all
+        {{0.5f, 0.25f, 1}, 0, {0, 0, -1}, 0}, // no ray
+        {{0.5f, 0.25f, 1}, -1, {0, 0, -1}, 0}, // no ray
+    };
+    static const struct {
+        uint32_t node, triangle; // node RAY_MISS: nothing
+        float barycentrics[2];
+    } expected[] = {
+        {0, 0, {0.375f, 0.375f}}, // (x + 1) / 2 - (y + 1) / 2, (y + 1) / 2
+        {1, 1, {0.25f, 0.375f}}, // (x + 1) / 2, (y - x) / 2
+        {1, 1, {0.25f, 0.375f}},  {RAY_MISS, 0, {0}}, {0, 0, {0.125f, 0.625f}},
+        {RAY_MISS, 0, {0}},       {RAY_MISS, 0, {0}}, {RAY_MISS, 0, {0}},
+    };
+    for (size_t t = 0; t < countof(tracers); t++) {
+        answers a = trace(r, tracers[t], rays, countof(rays));
+        for (size_t i = 0; i < countof(rays); i++) {
+            const ray_hit *hit = &a.hits[i];
+            const bool found = hit->instance != RAY_MISS;
+            CHECK(found == (expected[i].node != RAY_MISS));
+            if (rays[i].reach > 0)
+                CHECK(a.visible[i] == !found);
+            if (!found)
+                continue;
+            CHECK(r->gpu_world->instance_data[hit->instance].mesh == expected[i].node);
+            CHECK(hit->geometry == 0 && hit->triangle == expected[i].triangle);
+            for (int k = 0; k < 2; k++)
+                CHECK_NEAR(hit->barycentrics[k], expected[i].barycentrics[k], 1e-6);
+        }
+        answers_free(&a);
+    }
+    renderer_destroy(r);
+}
+
+// ---- The two tracers against each other
+
+static uint32_t random_state;
+
+static float random_unit(void) // xorshift; in [0,1)
+{
+    random_state ^= random_state << 13;
+    random_state ^= random_state >> 17;
+    random_state ^= random_state << 5;
+    return (float)(random_state >> 8) / 16777216;
+}
+
+static void random_direction(float d[3])
+{
+    float square;
+    do {
+        square = 0;
+        for (int k = 0; k < 3; k++) {
+            d[k] = 2 * random_unit() - 1;
+            square += d[k] * d[k];
+        }
+    } while (square > 1 || square < 0.01f);
+    for (int k = 0; k < 3; k++)
+        d[k] /= sqrtf(square);
+}
+
+// From anywhere within the scene's bounds to anywhere; every other ray ends somewhere.
+static ray *random_rays(const scene_data *s, uint32_t count)
+{
+    ray *rays = memory_alloc(count * sizeof *rays);
+    random_state = 1;
+    for (uint32_t i = 0; i < count; i++) {
+        float diagonal = 0;
+        for (int k = 0; k < 3; k++) {
+            const float extent = s->bounds_max[k] - s->bounds_min[k];
+            rays[i].origin[k] = s->bounds_min[k] + extent * random_unit();
+            diagonal += extent * extent;
+        }
+        random_direction(rays[i].direction);
+        rays[i].reach = i % 2 ? 1e30f : 0.5f * sqrtf(diagonal) * random_unit();
+    }
+    return rays;
+}
+
+static void hit_position(const renderer *r, const ray_hit *hit, double position[3])
+{
+    const scene_data *s = r->scene;
+    const mesh_instance_gpu *instance = &r->gpu_world->instance_data[hit->instance];
+    const mesh_primitive *p = &s->primitives[instance->first_primitive + hit->geometry];
+    const double u = hit->barycentrics[0], v = hit->barycentrics[1], weights[3] = {1 - u - v, u, v};
+    double local[3] = {0};
+    for (uint32_t corner = 0; corner < 3; corner++)
+        for (int k = 0; k < 3; k++)
+            local[k] += weights[corner] *
+                        s->positions[p->first_vertex + s->indices[p->first_index + 3 * hit->triangle + corner]][k];
+    for (int row = 0; row < 3; row++) {
+        const float *m = instance->world[row];
+        position[row] = m[0] * local[0] + m[1] * local[1] + m[2] * local[2] + m[3];
+    }
+}
+
+static double hit_distance(const renderer *r, const ray *ray, const ray_hit *hit)
+{
+    double position[3], distance = 0;
+    hit_position(r, hit, position);
+    for (int k = 0; k < 3; k++)
+        distance += (position[k] - (double)ray->origin[k]) * (double)ray->direction[k];
+    return distance;
+}
+
+typedef struct differences {
+    uint32_t hits; // rays that hit something by query
+    uint32_t found; // that one tracer lets hit and the other miss
+    uint32_t triangles; // that both let hit, but other triangles
+    uint32_t distances; // that both let hit, but not at the same distance
+    uint32_t visible; // that one tracer lets through and the other does not
+    uint32_t itself; // where Embree's two answers do not agree with each other
+    double worst; // difference of distances, over all that both let hit, as a multiple of what is allowed
+} differences;
+
+// A relative 1e-4, and what rounding to floats makes of positions and barycentrics, which counts for origins close to
+// what they hit: 1e-6 of the scene's diagonal.
+static double distance_tolerance(const renderer *r, double distance)
+{
+    return 1e-4 * fabs(distance) + 2e-6 * (double)r->constants.scene_radius;
+}
+
+static bool hits_same_triangle(const ray_hit *a, const ray_hit *b)
+{
+    return a->instance == b->instance && a->geometry == b->geometry && a->triangle == b->triangle;
+}
+
+static differences compare(renderer *r, const ray *rays, uint32_t count)
+{
+    answers query = trace(r, RAYS_QUERY, rays, count), embree = trace(r, RAYS_EMBREE, rays, count);
+    differences d = {0};
+    for (uint32_t i = 0; i < count; i++) {
+        const bool query_found = query.hits[i].instance != RAY_MISS, found = embree.hits[i].instance != RAY_MISS;
+        d.hits += query_found;
+        d.found += found != query_found;
+        d.visible += rays[i].reach > 0 && query.visible[i] != embree.visible[i];
+        d.itself += rays[i].reach > 0 && embree.visible[i] == found;
+        if (!found || !query_found)
+            continue;
+        const double expected = hit_distance(r, &rays[i], &query.hits[i]);
+        const double difference = fabs(hit_distance(r, &rays[i], &embree.hits[i]) - expected);
+        const double error = difference / distance_tolerance(r, expected);
+        d.triangles += !hits_same_triangle(&query.hits[i], &embree.hits[i]);
+        d.distances += error > 1;
+        d.worst = fmax(d.worst, error);
+    }
+    answers_free(&query);
+    answers_free(&embree);
+    return d;
+}
+
+static void differences_print(const char *name, const differences *d, uint32_t count)
+{
+    printf(
+        "  %s: of %u rays %u hit; differ: %u in hit or miss, %u in visibility, %u in triangle, %u in distance (worst "
+        "%.2g of the tolerance)\n",
+        name, count, d->hits, d->found, d->visible, d->triangles, d->distances, d->worst);
+}
+
+static differences scene_compare(const scene_data *scene, const char *name, uint32_t count)
+{
+    renderer *r = renderer_of(scene);
+    ray *rays = random_rays(scene, count);
+    const differences d = compare(r, rays, count);
+    differences_print(name, &d, count);
+    free(rays);
+    renderer_destroy(r);
+    return d;
+}
+
+TEST(both_find_the_same_in_scenes)
+{
+    static const char *const paths[] = {
+        OWN_SCENES "cornell.glb",
+        OWN_SCENES "two_rooms.glb",
+        OWN_SCENES "atrium.glb",
+        SHARED_SCENES "sponza/sponza.gltf", // with alpha masks
+        SHARED_SCENES "kitchen/kitchen.gltf",
+        SHARED_SCENES "materials/AlphaBlendModeTest/AlphaBlendModeTest.gltf",
+        SHARED_SCENES "materials/NormalTangentMirrorTest/NormalTangentMirrorTest.gltf",
+    };
+    enum { RAYS = 100000 };
+    for (size_t i = 0; i < countof(paths); i++) {
+        if (access(paths[i], R_OK) != 0) {
+            printf("  skipped: no %s\n", paths[i]);
+            continue;
+        }
+        scene_data *scene = scene_load(paths[i]);
+        CHECK(scene != NULL);
+        if (!scene)
+            continue;
+        const differences d = scene_compare(scene, strrchr(paths[i], '/') + 1, RAYS);
+        CHECK(d.hits > RAYS / 10);
+        // Measured: 0 everywhere. A ray through an edge may miss, or a rounded alpha fall on the other side of the
+        // cutoff.
+        CHECK(d.found <= 2 && d.visible <= 2 && d.distances <= 2);
+        CHECK(d.itself <= 2);
+        scene_destroy(scene);
+    }
+}
+
+// ---- Alpha masks
+
+typedef struct mask_case {
+    const char *name;
+    int filter, wrap; // glTF's; 0: the default
+    uint32_t uv_set;
+    float transform[4], offset[2];
+} mask_case;
+
+// A quad with a mask of 8x8 random alphas between corners of different alpha: the share of rays it stops.
+static double mask_compare(const mask_case *c)
+{
+    enum { SIZE = 8, RAYS = 20000 };
+    quad_scene s;
+    quad_scene_init(&s);
+    uint8_t texels[4 * SIZE * SIZE];
+    random_state = 7;
+    for (size_t i = 0; i < countof(texels); i++)
+        texels[i] = (uint8_t)(256 * random_unit());
+    texture_set(&s, texels, SIZE, SIZE, true);
+    s.texture.mag_filter = c->filter;
+    s.texture.wrap_s = s.texture.wrap_t = c->wrap;
+    material *m = quad_add(&s, IDENTITY);
+    m->flags = MATERIAL_ALPHA_MASK;
+    m->base_color[3] = 0.9f;
+    m->alpha_cutoff = 0.3f;
+    m->base_texture = (texture_reference){.texture = 0, .uv_set = c->uv_set};
+    memcpy(m->base_texture.transform, c->transform, sizeof c->transform);
+    memcpy(m->base_texture.offset, c->offset, sizeof c->offset);
+    for (int i = 0; i < 4; i++) {
+        s.attributes[i].color_ba = 0xffffu | (uint32_t)(40000 + 8000 * i) << 16;
+        s.attributes[i].uv1[0] = 0.4f * s.attributes[i].uv0[1];
+        s.attributes[i].uv1[1] = 1.7f * s.attributes[i].uv0[0];
+    }
+    ray *rays = memory_alloc(RAYS * sizeof *rays);
+    for (int i = 0; i < RAYS; i++)
+        rays[i] = (ray){{2 * random_unit() - 1, 2 * random_unit() - 1, 1}, 2, {0, 0, -1}, 0};
+    renderer *r = renderer_of(&s.data);
+    const differences d = compare(r, rays, RAYS);
+    differences_print(c->name, &d, RAYS);
+    // Measured: 0 in each case. A rounded alpha may fall on the other side of the cutoff.
+    CHECK(d.found <= 2 && d.visible <= 2);
+    CHECK(d.itself == 0 && d.distances == 0);
+    free(rays);
+    renderer_destroy(r);
+    return (double)d.hits / RAYS;
+}
+
+TEST(alpha_masks_let_the_same_rays_through)
+{
+    enum { NEAREST = 9728, CLAMP = 33071, MIRROR = 33648 };
+    static const mask_case cases[] = {
+        {"nearest", NEAREST, 0, 0, {1, 0, 0, 1}, {0, 0}},
+        {"nearest, repeated, turned", NEAREST, 0, 0, {2, 1, -1, 2}, {0.3f, -0.7f}},
+        {"nearest, mirrored", NEAREST, MIRROR, 0, {3, 0, 0, 3}, {-1.5f, 0.25f}},
+        {"nearest, clamped", NEAREST, CLAMP, 0, {2, 0, 0, 2}, {-0.5f, -0.5f}},
+        {"nearest, second uv set", NEAREST, 0, 1, {1, 0, 0, 1}, {0, 0}},
+        {"linear", 0, 0, 0, {1, 0, 0, 1}, {0, 0}},
+        {"linear, mirrored", 0, MIRROR, 0, {3, 0, 0, 3}, {-1.5f, 0.25f}},
+        {"linear, clamped", 0, CLAMP, 0, {2, 0, 0, 2}, {-0.5f, -0.5f}},
+    };
+    for (size_t i = 0; i < countof(cases); i++) {
+        const double share = mask_compare(&cases[i]);
+        CHECK(share > 0.2 && share < 0.9);
+    }
+}
+
+// ---- Instances
+
+// Rotated, stretched and half of them mirrored.
+static void random_matrix(float m[16])
+{
+    float axes[3][3];
+    random_direction(axes[0]);
+    random_direction(axes[2]);
+    for (int k = 0; k < 3; k++)
+        axes[1][k] = axes[2][(k + 1) % 3] * axes[0][(k + 2) % 3] - axes[2][(k + 2) % 3] * axes[0][(k + 1) % 3];
+    for (int column = 0; column < 3; column++) {
+        const float scale = (0.2f + 2 * random_unit()) * (random_unit() < 0.5f ? -1 : 1);
+        for (int k = 0; k < 3; k++)
+            m[4 * column + k] = scale * axes[column][k];
+        m[4 * column + 3] = 0;
+        m[12 + column] = 4 * random_unit() - 2;
+    }
+    m[15] = 1;
+}
+
+static node_component *node_of(renderer *r, uint32_t index)
+{
+    uint32_t i = 0;
+    node_component *found = NULL;
+    for (ecs_iterator it = ecs_iterate(r->world, r->gpu_world->node); ecs_next(&it);)
+        found = i++ == index ? it.component : found;
+    return found;
+}
+
+static void instances_compare(renderer *r, const char *name, uint32_t instances)
+{
+    enum { RAYS = 20000 };
+    static const scene_data around = {.bounds_min = {-4, -4, -4}, .bounds_max = {4, 4, 4}};
+    ray *rays = random_rays(&around, RAYS);
+    const differences d = compare(r, rays, RAYS);
+    differences_print(name, &d, RAYS);
+    CHECK(r->gpu_world->instance_count == instances);
+    CHECK(d.hits >= 100 * instances);
+    CHECK(d.found == 0 && d.visible == 0 && d.distances == 0 && d.itself == 0); // measured
+    free(rays);
+}
+
+TEST(both_find_the_same_instances_wherever_they_move)
+{
+    quad_scene s;
+    quad_scene_init(&s);
+    float matrix[16];
+    random_state = 3;
+    for (int i = 0; i < 6; i++) {
+        random_matrix(matrix);
+        quad_add(&s, matrix);
+    }
+    s.primitives[5].index_count = 0; // a mesh without triangles
+    renderer *r = renderer_of(&s.data);
+    instances_compare(r, "5 quads", 5);
+    random_state = 11;
+    for (uint32_t i = 0; i < 3; i++)
+        random_matrix(node_of(r, i)->matrix);
+    instances_compare(r, "3 moved", 5);
+    const entity e = ecs_entity_create(r->world);
+    random_matrix(((node_component *)ecs_add(r->world, e, r->gpu_world->node))->matrix);
+    ((mesh_component *)ecs_add(r->world, e, r->gpu_world->mesh))->mesh = 2;
+    instances_compare(r, "1 more", 6);
+    memset(node_of(r, 1)->matrix, 0, 3 * 4 * sizeof(float)); // scaled to nothing
+    instances_compare(r, "1 vanished", 5);
+    ecs_entity_destroy(r->world, e);
+    instances_compare(r, "1 gone", 4);
+    for (uint32_t i = 0; i < 6; i++)
+        memset(node_of(r, i)->matrix, 0, 3 * 4 * sizeof(float));
+    instances_compare(r, "nothing left", 0);
+    renderer_destroy(r);
+}
+
+TEST(a_moved_quad_is_hit_where_it_went)
+{
+    quad_scene s;
+    quad_scene_init(&s);
+    quad_add(&s, IDENTITY);
+    renderer *r = renderer_of(&s.data);
+    const ray down = {{0.25f, 0.5f, 1}, 1e30f, {0, 0, -1}, 0};
+    for (int frame = 0; frame < 4; frame++) {
+        node_of(r, 0)->matrix[14] = -(float)frame;
+        for (size_t t = 0; t < countof(tracers); t++) {
+            answers a = trace(r, tracers[t], &down, 1);
+            CHECK(a.hits[0].instance == 0 && a.visible[0] == 0);
+            CHECK_NEAR(hit_distance(r, &down, &a.hits[0]), 1 + frame, 1e-6);
+            answers_free(&a);
+        }
+    }
+    renderer_destroy(r);
+}
+
+TEST(primitives_without_triangles_leave_the_count_of_geometries)
+{
+    quad_scene s;
+    quad_scene_init(&s);
+    for (int i = 0; i < 3; i++)
+        quad_add(&s, IDENTITY);
+    s.data.mesh_count = s.data.node_count = 1;
+    s.meshes[0].primitive_count = 3;
+    s.primitives[0].index_count = s.primitives[1].index_count = 0;
+    renderer *r = renderer_of(&s.data);
+    const ray down = {{0.25f, 0.5f, 1}, 1e30f, {0, 0, -1}, 0};
+    for (size_t t = 0; t < countof(tracers); t++) {
+        answers a = trace(r, tracers[t], &down, 1);
+        CHECK(a.hits[0].instance == 0 && a.hits[0].geometry == 2);
+        answers_free(&a);
+    }
+    renderer_destroy(r);
+}
+
+// ---- The frame
+
+TEST(an_empty_batch_is_traced)
+{
+    quad_scene s;
+    quad_scene_init(&s);
+    quad_add(&s, IDENTITY);
+    renderer *r = renderer_of(&s.data);
+    for (size_t t = 0; t < countof(tracers); t++) {
+        answers a = trace(r, tracers[t], NULL, 0);
+        answers_free(&a);
+    }
+    renderer_destroy(r);
+}
+
+TEST(embree_gives_the_same_bytes_every_time)
+{
+    scene_data *scene = scene_load(OWN_SCENES "atrium.glb");
+    enum { RAYS = 20000 };
+    ray *rays = random_rays(scene, RAYS);
+    answers runs[2];
+    for (int run = 0; run < 2; run++) {
+        renderer *r = renderer_of(scene);
+        runs[run] = trace(r, RAYS_EMBREE, rays, RAYS);
+        renderer_destroy(r);
+    }
+    CHECK(memcmp(runs[0].hits, runs[1].hits, RAYS * sizeof *runs[0].hits) == 0);
+    for (int i = 0; i < RAYS; i++)
+        CHECK(!(rays[i].reach > 0) || runs[0].visible[i] == runs[1].visible[i]);
+    for (int run = 0; run < 2; run++)
+        answers_free(&runs[run]);
+    free(rays);
+    scene_destroy(scene);
+}
+
+static bool pass_ran(const renderer *r, const char *name)
+{
+    uint32_t count;
+    const frame_graph_timing *timings = frame_graph_timings(r->graph, &count);
+    for (uint32_t i = 0; i < count; i++)
+        if (strcmp(timings[i].name, name) == 0)
+            return true;
+    return false;
+}
+
+TEST(only_the_structure_that_is_traced_is_built)
+{
+    quad_scene s;
+    quad_scene_init(&s);
+    quad_add(&s, IDENTITY);
+    renderer *r = renderer_of(&s.data);
+    const ray down = {{0, 0, 1}, 1, {0, 0, -1}, 0};
+    for (size_t t = 0; t < countof(tracers); t++) {
+        answers a = trace(r, tracers[t], &down, 1);
+        CHECK(pass_ran(r, "near/trace") && pass_ran(r, "seen/trace"));
+        CHECK(pass_ran(r, "acceleration") == (tracers[t] == RAYS_QUERY));
+        CHECK(pass_ran(r, "rays/scene") == (tracers[t] == RAYS_EMBREE));
+        answers_free(&a);
+    }
+    renderer_destroy(r);
+}
+
+TEST(auto_is_embree_on_a_cpu_and_query_elsewhere)
+{
+    quad_scene s;
+    quad_scene_init(&s);
+    quad_add(&s, IDENTITY);
+    renderer *r = renderer_of(&s.data);
+    r->settings.rays = RAYS_AUTO;
+    CHECK(rays_are_host(r) == gpu_is_cpu(device));
+    renderer_destroy(r);
+}
+
+TEST(the_validation_layer_is_silent)
+{
+    CHECK(gpu_validation_messages(device) == 0);
+}
+
+// ---- The bench
+
+typedef struct bare { // Embree alone, over opaque copies of the same two levels
+    RTCDevice device;
+    RTCScene scene;
+    struct RTCRay *rays;
+} bare;
+
+static RTCScene bare_mesh(RTCDevice device, const scene_data *s, const scene_mesh *mesh)
+{
+    RTCScene scene = rtcNewScene(device);
+    for (uint32_t i = 0; i < mesh->primitive_count; i++) {
+        const mesh_primitive *p = &s->primitives[mesh->first_primitive + i];
+        RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
+        void *positions = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
+                                                  sizeof *s->positions, p->vertex_count);
+        memcpy(positions, s->positions + p->first_vertex, p->vertex_count * sizeof *s->positions);
+        void *indices = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
+                                                3 * sizeof *s->indices, p->index_count / 3);
+        memcpy(indices, s->indices + p->first_index, p->index_count * sizeof *s->indices);
+        rtcCommitGeometry(geometry);
+        rtcAttachGeometry(scene, geometry);
+        rtcReleaseGeometry(geometry);
+    }
+    rtcCommitScene(scene);
+    return scene;
+}
+
+static void bare_build(bare *b, const scene_data *s)
+{
+    b->device = rtcNewDevice(NULL);
+    b->scene = rtcNewScene(b->device);
+    RTCScene *meshes = memory_alloc(s->mesh_count * sizeof *meshes);
+    for (uint32_t i = 0; i < s->mesh_count; i++)
+        meshes[i] = bare_mesh(b->device, s, &s->meshes[i]);
+    for (uint32_t i = 0; i < s->node_count; i++) {
+        if (s->nodes[i].mesh == SCENE_NONE)
+            continue;
+        RTCGeometry geometry = rtcNewGeometry(b->device, RTC_GEOMETRY_TYPE_INSTANCE);
+        rtcSetGeometryInstancedScene(geometry, meshes[s->nodes[i].mesh]);
+        rtcSetGeometryTransform(geometry, 0, RTC_FORMAT_FLOAT4X4_COLUMN_MAJOR, s->nodes[i].world);
+        rtcCommitGeometry(geometry);
+        rtcAttachGeometry(b->scene, geometry);
+        rtcReleaseGeometry(geometry);
+    }
+    rtcCommitScene(b->scene);
+    for (uint32_t i = 0; i < s->mesh_count; i++)
+        rtcReleaseScene(meshes[i]);
+    free(meshes);
+}
+
+static void bare_run(uint32_t begin, uint32_t end, void *user)
+{
+    const bare *b = user;
+    struct RTCIntersectContext context;
+    rtcInitIntersectContext(&context);
+    for (uint32_t i = begin; i < end; i++)
+        rtcOccluded1(b->scene, &context, &b->rays[i]);
+}
+
+static double bare_milliseconds(const bare *b, parallel *pool, const ray *rays, uint32_t count)
+{
+    for (uint32_t i = 0; i < count; i++) {
+        const float *o = rays[i].origin, *d = rays[i].direction;
+        b->rays[i] = (struct RTCRay){.org_x = o[0],
+                                     .org_y = o[1],
+                                     .org_z = o[2],
+                                     .dir_x = d[0],
+                                     .dir_y = d[1],
+                                     .dir_z = d[2],
+                                     .tfar = rays[i].reach,
+                                     .mask = ~0u};
+    }
+    const double start = time_now();
+    parallel_for(pool, count, 1024, bare_run, (void *)b);
+    return (time_now() - start) * 1e3;
+}
+
+static double pass_milliseconds(const renderer *r, const char *name)
+{
+    uint32_t count;
+    const frame_graph_timing *timings = frame_graph_timings(r->graph, &count);
+    for (uint32_t i = 0; i < count; i++)
+        if (strcmp(timings[i].name, name) == 0)
+            return timings[i].milliseconds;
+    return 0;
+}
+
+// From where one random ray ends to where another does, as from a pixel to a VPL; in no order.
+static void shadow_rays(renderer *r, ray *rays, uint32_t count)
+{
+    ray *searching = random_rays(r->scene, 2 * count);
+    for (uint32_t i = 0; i < 2 * count; i++)
+        searching[i].reach = 1e30f;
+    answers a = trace(r, RAYS_EMBREE, searching, 2 * count);
+    for (uint32_t i = 0; i < count; i++) {
+        float ends[2][3], square = 0;
+        for (uint32_t k = 0; k < 2; k++) {
+            const ray *from = &searching[2 * i + k];
+            const ray_hit *hit = &a.hits[2 * i + k];
+            const double reach = hit->instance == RAY_MISS ? 1 : 0.999 * hit_distance(r, from, hit);
+            for (int axis = 0; axis < 3; axis++)
+                ends[k][axis] = from->origin[axis] + (float)reach * from->direction[axis];
+        }
+        for (int axis = 0; axis < 3; axis++) {
+            rays[i].origin[axis] = ends[0][axis];
+            rays[i].direction[axis] = ends[1][axis] - ends[0][axis];
+            square += rays[i].direction[axis] * rays[i].direction[axis];
+        }
+        rays[i].reach = 0.9999f * sqrtf(square);
+        for (int axis = 0; axis < 3; axis++)
+            rays[i].direction[axis] /= sqrtf(square);
+    }
+    answers_free(&a);
+    free(searching);
+}
+
+static int compare_doubles(const void *left, const void *right)
+{
+    const double a = *(const double *)left, b = *(const double *)right;
+    return (a > b) - (a < b);
+}
+
+static double median(double *values, size_t count)
+{
+    qsort(values, count, sizeof *values, compare_doubles);
+    return values[count / 2];
+}
+
+static int print_bench(const char *path, uint32_t count)
+{
+    enum { REPEATS = 9 };
+    scene_data *scene = scene_load(path);
+    if (!scene)
+        return EXIT_FAILURE;
+    renderer *r = renderer_of(scene);
+    parallel *pool = parallel_create(0);
+    bare b = {.rays = aligned_alloc(16, count * sizeof *b.rays)};
+    bare_build(&b, scene);
+    ray *rays = memory_alloc(count * sizeof *rays);
+    shadow_rays(r, rays, count);
+    double query[REPEATS], embree[REPEATS], alone[REPEATS], visible = 0;
+    for (int i = 0; i < REPEATS; i++) { // in turns, so that what else runs hits all alike
+        answers a = trace(r, RAYS_QUERY, rays, count);
+        query[i] = pass_milliseconds(r, "seen/trace");
+        answers_free(&a);
+        a = trace(r, RAYS_EMBREE, rays, count);
+        embree[i] = pass_milliseconds(r, "seen/trace");
+        alone[i] = bare_milliseconds(&b, pool, rays, count);
+        visible = 0;
+        for (uint32_t k = 0; k < count; k++)
+            visible += a.visible[k];
+        answers_free(&a);
+    }
+    const double scale = 1e-3 * count, query_rate = scale / median(query, REPEATS),
+                 embree_rate = scale / median(embree, REPEATS), alone_rate = scale / median(alone, REPEATS);
+    printf("%s, %u shadow rays, %.1f %% visible, %u threads; Mray/s, median of %d\n", path, count,
+           100 * visible / count, parallel_threads(pool), REPEATS);
+    printf("query %.2f, embree %.2f (%.1f times query), embree alone, opaque %.2f (in the renderer %.2f of it)\n",
+           query_rate, embree_rate, embree_rate / query_rate, alone_rate, embree_rate / alone_rate);
+    free(rays);
+    free(b.rays);
+    rtcReleaseScene(b.scene);
+    rtcReleaseDevice(b.device);
+    parallel_destroy(pool);
+    renderer_destroy(r);
+    scene_destroy(scene);
+    return EXIT_SUCCESS;
+}
+
+int main(int argc, char **argv)
+{
+    const bool bench = argc >= 3 && strcmp(argv[1], "bench") == 0;
+    device = gpu_create(&(gpu_desc){.validation = !bench});
+    if (!device) {
+        printf("skipped: no device with the validation layer\n");
+        return 77;
+    }
+    if (bench)
+        return print_bench(argv[2], argc > 3 ? (uint32_t)strtoul(argv[3], NULL, 10) : 230400);
+    RUN(rays_find_the_nearest_quad_within_their_reach);
+    RUN(both_find_the_same_in_scenes);
+    RUN(alpha_masks_let_the_same_rays_through);
+    RUN(both_find_the_same_instances_wherever_they_move);
+    RUN(a_moved_quad_is_hit_where_it_went);
+    RUN(primitives_without_triangles_leave_the_count_of_geometries);
+    RUN(an_empty_batch_is_traced);
+    RUN(embree_gives_the_same_bytes_every_time);
+    RUN(only_the_structure_that_is_traced_is_built);
+    RUN(auto_is_embree_on_a_cpu_and_query_elsewhere);
+    RUN(the_validation_layer_is_silent);
+    gpu_destroy(device);
+    return test_end();
+}
