@@ -625,17 +625,212 @@ TEST(the_hierarchy_converges_to_the_reference)
     fixture_destroy(&f);
 }
 
+// ---- The bias of the singularity
+
+typedef struct face {
+    vec corners[3], normal;
+} face;
+
+static face face_of(const float world[16], const float *const positions[3])
+{
+    face f;
+    for (int i = 0; i < 3; i++) {
+        f.corners[i] = vec_of(world + 12);
+        for (int k = 0; k < 3; k++)
+            f.corners[i] = vec_mad(f.corners[i], (double)positions[i][k], vec_of(world + 4 * k));
+    }
+    const vec a = vec_mad(f.corners[1], -1, f.corners[0]), b = vec_mad(f.corners[2], -1, f.corners[0]);
+    const vec n = {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
+    f.normal = vec_mad((vec){0}, 1 / sqrt(vec_dot(n, n)), n);
+    return f;
+}
+
+// All triangles of the scene; free() it.
+static face *faces_of(const scene_data *scene, size_t *count)
+{
+    face *faces = NULL;
+    size_t capacity = 0;
+    *count = 0;
+    for (uint32_t n = 0; n < scene->node_count; n++) {
+        const scene_node *node = &scene->nodes[n];
+        const scene_mesh *mesh = node->mesh == SCENE_NONE ? NULL : &scene->meshes[node->mesh];
+        for (uint32_t p = 0; mesh && p < mesh->primitive_count; p++) {
+            const mesh_primitive *primitive = &scene->primitives[mesh->first_primitive + p];
+            const uint32_t *indices = scene->indices + primitive->first_index;
+            memory_reserve((void **)&faces, &capacity, *count + primitive->index_count / 3, sizeof *faces);
+            for (uint32_t i = 0; i < primitive->index_count; i += 3) {
+                const float *corners[3];
+                for (int k = 0; k < 3; k++)
+                    corners[k] = scene->positions[primitive->first_vertex + indices[i + k]];
+                faces[(*count)++] = face_of(node->world, corners);
+            }
+        }
+    }
+    return faces;
+}
+
+static double segment_distance(vec p, vec a, vec b)
+{
+    const vec edge = vec_mad(b, -1, a), offset = vec_mad(p, -1, a);
+    const double t = fmin(fmax(vec_dot(offset, edge) / vec_dot(edge, edge), 0), 1);
+    const vec apart = vec_mad(offset, -t, edge);
+    return sqrt(vec_dot(apart, apart));
+}
+
+static double face_distance(vec p, const face *f)
+{
+    double distance = INFINITY;
+    bool inside = true;
+    for (int i = 0; i < 3; i++) {
+        const vec a = f->corners[i], b = f->corners[(i + 1) % 3];
+        const vec edge = vec_mad(b, -1, a), offset = vec_mad(p, -1, a), n = f->normal;
+        const vec across = {n.y * edge.z - n.z * edge.y, n.z * edge.x - n.x * edge.z, n.x * edge.y - n.y * edge.x};
+        inside = inside && vec_dot(across, offset) >= 0;
+        distance = fmin(distance, segment_distance(p, a, b));
+    }
+    return inside ? fabs(vec_dot(vec_mad(p, -1, f->corners[0]), f->normal)) : distance;
+}
+
+// Whether light could go straight from one to the other: each lies, if only in part, in front of the other.
+static bool faces_point(const face *f, const point *p)
+{
+    const double nearly = 1e-3;
+    bool in_front = false;
+    for (int i = 0; i < 3; i++)
+        in_front = in_front || vec_dot(p->geometric, vec_mad(f->corners[i], -1, p->position)) > nearly;
+    return in_front && vec_dot(f->normal, vec_mad(p->position, -1, f->corners[0])) > nearly;
+}
+
+// The pixels that are farther than `distance` from every face that they could see. "depth", "normals" and "albedo" are
+// exported. free() it.
+static bool *far_pixels(renderer *r, double distance)
+{
+    size_t count;
+    face *faces = faces_of(r->scene, &count);
+    point *points = points_read(r);
+    bool *far = memory_alloc(pixels_of(r));
+    for (size_t i = 0; i < pixels_of(r); i++) {
+        far[i] = points[i].drawn;
+        for (size_t f = 0; f < count && far[i]; f++)
+            far[i] = !faces_point(&faces[f], &points[i]) || face_distance(points[i].position, &faces[f]) > distance;
+    }
+    free(faces);
+    free(points);
+    return far;
+}
+
+typedef struct truth {
+    float *picture; // by path tracing
+    bool *far; // farther than 5 % of the box's edge from other faces
+    double error; // its own, estimated
+    size_t pixels;
+} truth;
+
+static truth truth_of(const char *scene, render_settings s, uint32_t spp)
+{
+    s.method = METHOD_PATH;
+    s.spp = spp;
+    fixture f = fixture_create(scene, NULL, &s);
+    exports_set(f.r, gbuffer_exports, 3);
+    finish(f.r);
+    const scene_data *d = f.scene;
+    truth t = {radiance_read(f.r), far_pixels(f.r, 0.05 * (double)(d->bounds_max[1] - d->bounds_min[1])),
+               progressive_status_get(f.r, true).error, pixels_of(f.r)};
+    fixture_destroy(&f);
+    return t;
+}
+
+static void truth_free(truth *t)
+{
+    free(t->picture);
+    free(t->far);
+}
+
+TEST(small_singularity_and_many_vpls_are_path_tracing)
+{
+    render_settings s = settings_of(METHOD_VPL, 24, 20000);
+    s.only = ONLY_ALL;
+    s.singularity = 0.001f;
+    truth t = truth_of(SCENES "cornell.glb", s, 4096);
+    float *picture = picture_of(SCENES "cornell.glb", NULL, &s);
+    const comparison all = compare(picture, t.picture, NULL, t.pixels),
+                     far = compare(picture, t.picture, t.far, t.pixels);
+    printf("  energy %.4f, relative L2 %.4f; far from other faces %.4f, %.4f; path's own error %.4f\n", all.energy,
+           all.error, far.energy, far.error, t.error);
+    CHECK_NEAR(all.energy, 1, 0.01);
+    CHECK_NEAR(far.energy, 1, 0.01);
+    CHECK(far.error < 0.03);
+    free(picture);
+    truth_free(&t);
+}
+
+// `direct` becomes what is left of `picture` without it: the indirect light.
+static void direct_remove(float *direct, const float *picture, size_t pixels)
+{
+    for (size_t i = 0; i < 4 * pixels; i++)
+        direct[i] = picture[i] - direct[i];
+}
+
+static void bias_row_print(const float *picture, const float *truth, const bool *far, size_t pixels)
+{
+    const comparison a = compare(picture, truth, NULL, pixels), f = compare(picture, truth, far, pixels);
+    printf("    %.4f  %.4f    %.4f  %.4f", a.energy, a.error, f.energy, f.error);
+}
+
+static void bias_print(const char *scene, uint32_t vpls)
+{
+    enum { SPP = 4096 };
+    static const float singularities[] = {0.01f, 0.003f, 0.001f, 0.0003f, 0};
+    render_settings s = settings_of(METHOD_VPL, 64, vpls);
+    s.only = ONLY_DIRECT;
+    float *direct = picture_of(scene, NULL, &s);
+    s.only = ONLY_ALL;
+    truth t = truth_of(scene, s, SPP);
+    float *indirect = memory_alloc(t.pixels * 16);
+    memcpy(indirect, direct, t.pixels * 16);
+    direct_remove(indirect, t.picture, t.pixels);
+    size_t far_count = 0;
+    for (size_t i = 0; i < t.pixels; i++)
+        far_count += t.far[i];
+    printf("%s, 64x64, %u slots; path: %u spp, its own error %.4f; %zu pixels are far from other faces\n", scene, vpls,
+           SPP, t.error, far_count);
+    printf("               all light         far from faces    indirect light    far from faces\n"
+           "       b    energy  error     energy  error     energy  error     energy  error\n");
+    for (size_t i = 0; i < countof(singularities); i++) {
+        s.singularity = singularities[i];
+        float *picture = picture_of(scene, NULL, &s), *part = memory_alloc(t.pixels * 16);
+        memcpy(part, direct, t.pixels * 16);
+        direct_remove(part, picture, t.pixels);
+        printf("  %6.4f", (double)s.singularity);
+        bias_row_print(picture, t.picture, t.far, t.pixels);
+        bias_row_print(part, indirect, t.far, t.pixels);
+        printf("\n");
+        fflush(stdout);
+        free(picture);
+        free(part);
+    }
+    free(direct);
+    free(indirect);
+    truth_free(&t);
+}
+
 TEST(validation_layer_is_silent)
 {
     CHECK(gpu_validation_messages(device) == 0);
 }
 
-int main(void)
+int main(int argc, char **argv)
 {
-    device = gpu_create(&(gpu_desc){.validation = true});
+    const bool bias = argc > 1 && strcmp(argv[1], "bias") == 0;
+    device = gpu_create(&(gpu_desc){.validation = !bias});
     if (!device) {
         printf("no device with a validation layer\n");
         return 77;
+    }
+    if (bias) {
+        bias_print(SCENES "cornell.glb", argc > 2 ? (uint32_t)atoi(argv[2]) : 100000);
+        gpu_destroy(device);
+        return test_end();
     }
     RUN(unshadowed_light_is_the_sum_over_the_slots);
     RUN(no_shadow_samples_means_no_shadows);
@@ -654,6 +849,7 @@ int main(void)
     RUN(few_vpls_and_none_are_fine);
     RUN(the_furnace_has_its_closed_form);
     RUN(the_hierarchy_converges_to_the_reference);
+    RUN(small_singularity_and_many_vpls_are_path_tracing);
     RUN(validation_layer_is_silent);
     gpu_destroy(device);
     return test_end();
