@@ -1,6 +1,7 @@
 // `lanternfield render`: loads a scene, renders its frames and writes what was asked for.
 #include "lanternfield.h"
 
+#include "modules/rays.h"
 #include "modules/world.h"
 
 #include <errno.h>
@@ -111,13 +112,29 @@ static bool camera_place(renderer *r, const render_request *request, uint32_t ca
 
 // ---- Memory
 
+// Bytes, measured on the device.
+static double memory_needed(const render_settings *settings)
+{
+    const double pixels = (double)settings->width * settings->height;
+    const uint32_t slots = settings->method == METHOD_IR ? settings->ir_vpls : settings->vpls;
+    const bool has_vpls = slots > 0 && settings->only != ONLY_DIRECT;
+    switch ((render_method)settings->method) {
+    case METHOD_LGH: // G-buffer and read-back; indirect light's images and their history
+        return pixels * (has_vpls ? 300 : 100);
+    case METHOD_PATH: // and sums, one path's rays and their answers
+        return pixels * 350;
+    case METHOD_VPL: // and sums, and a batch of rays
+    case METHOD_IR:
+        return pixels * 150 + (has_vpls ? 52.0 * RAYS_BATCH : 0);
+    }
+    return 0;
+}
+
 // A device that is the CPU takes what it likes until the system ends the process, so what a picture needs at least is
 // compared with what there is; other devices refuse an allocation by themselves.
 static bool memory_check(const gpu *gpu, const render_settings *settings)
 {
-    // Measured: G-buffer and read-back, and with indirect light its images and their history.
-    const bool has_indirect = settings->vpls > 0 && settings->only != ONLY_DIRECT;
-    const double needed = (double)settings->width * settings->height * (has_indirect ? 300 : 100);
+    const double needed = memory_needed(settings);
     double available = (double)sysconf(_SC_AVPHYS_PAGES) * (double)sysconf(_SC_PAGESIZE);
     FILE *const file = fopen("/proc/meminfo", "r");
     char line[128];
