@@ -1,5 +1,6 @@
 // Direct light: few punctual lights exactly, with a shadow ray each; many of them, and emissive triangles, by samples.
 #include "direct_light.h"
+#include "light_rays.h"
 #include "modules.h"
 #include "world.h"
 
@@ -18,10 +19,8 @@ typedef struct direct_light {
 
 static bool has_direct(const renderer *r)
 {
-    // Paths bring their own; statistics that ask for its rays would keep it alive.
-    const bool shown = r->settings.method != METHOD_PATH &&
-                       (r->settings.only == ONLY_ALL || r->settings.only == ONLY_DIRECT);
-    return shown && r->constants.light_count + r->constants.emitter_count > 0;
+    const bool shown = r->settings.only == ONLY_ALL || r->settings.only == ONLY_DIRECT;
+    return shown && r->settings.method != METHOD_PATH && r->constants.light_count + r->constants.emitter_count > 0;
 }
 
 static bool has_many_punctual(const renderer *r)
@@ -52,100 +51,99 @@ bool direct_light_is_analytic(const renderer *r)
     return true;
 }
 
-// What a pass needs when it runs.
+// What a pass that makes rays needs when it runs.
 typedef struct direct_light_dispatch {
     gpu_pipeline pipeline;
     uint32_t width, height;
     struct {
-        uint32_t samples, candidates, punctual;
+        uint32_t first, layers;
+        uint32_t samples, candidates, punctual; // of sampled light
     } push;
-    uint32_t push_size;
 } direct_light_dispatch;
 
 static void direct_light_execute(const frame_graph_context *context, void *user)
 {
     const direct_light_dispatch *d = user;
     frame_graph_bind(context, d->pipeline);
-    if (d->push_size > 0)
-        gpu_push(context->commands, &d->push, d->push_size);
+    gpu_push(context->commands, &d->push, sizeof d->push);
     gpu_dispatch(context->commands, div_up_u32(d->width, 8), div_up_u32(d->height, 8), 1);
 }
 
-static void rays_clear(const frame_graph_context *context, void *user)
+// Adds the pass that makes the rays of the current batch, with the bindings that are the same for both kinds.
+static frame_graph_pass *rays_pass_add(renderer *r, direct_light_dispatch dispatch, const light_rays *rays,
+                                       resource_chain *counter)
 {
-    (void)user;
-    gpu_buffer_fill(context->commands, frame_graph_buffer(context, "rays_direct_cleared"), 0, 16, 0);
-}
-
-static void rays_clear_declare(renderer *r)
-{
+    dispatch.width = r->settings.width;
+    dispatch.height = r->settings.height;
+    dispatch.push.first = rays->first;
+    dispatch.push.layers = rays->count;
     const frame_graph_pass_desc desc = {
-        .name = "direct_light/clear_rays", .kind = FRAME_GRAPH_TRANSFER, .execute = rays_clear};
-    const frame_graph_resource_desc rays = {.kind = FRAME_GRAPH_BUFFER, .size = 16, .host = true};
-    frame_graph_create_resource(frame_graph_pass_add(r->graph, &desc), "rays_direct_cleared", &rays,
-                                ACCESS_TRANSFER_WRITE);
-}
-
-// Adds a pass with its inputs, which are the same for both.
-static frame_graph_pass *direct_light_pass_add(renderer *r, const char *name, direct_light_dispatch *dispatch)
-{
-    dispatch->width = r->settings.width;
-    dispatch->height = r->settings.height;
-    const frame_graph_pass_desc desc = {
-        .name = name,
+        .name = rays->pass,
         .kind = FRAME_GRAPH_COMPUTE,
         .execute = direct_light_execute,
-        .user = dispatch,
-        .user_size = sizeof *dispatch,
+        .user = &dispatch,
+        .user_size = sizeof dispatch,
     };
     frame_graph_pass *pass = frame_graph_pass_add(r->graph, &desc);
     frame_graph_read(pass, "depth", ACCESS_SAMPLED);
     frame_graph_read(pass, "normals", ACCESS_SAMPLED);
-    frame_graph_read(pass, "tlas", ACCESS_TRACE);
+    resource_chain_next(counter, pass);
+    light_rays_make(r, rays, pass);
     return pass;
 }
 
-static void exact_declare(renderer *r, const direct_light *state, const char *rays_to)
+static void exact_declare(renderer *r, const direct_light *state, light_rays rays, resource_chain *counter)
 {
-    direct_light_dispatch dispatch = {.pipeline = state->exact};
-    frame_graph_pass *pass = direct_light_pass_add(r, "direct_light", &dispatch);
-    const frame_graph_resource_desc image =
-        frame_graph_image_of(VK_FORMAT_R32G32B32A32_SFLOAT, r->settings.width, r->settings.height);
-    frame_graph_create_resource(pass, "direct", &image, ACCESS_STORAGE_WRITE);
-    frame_graph_modify(pass, "rays_direct_cleared", rays_to, ACCESS_STORAGE_READ_WRITE);
+    do
+        rays_pass_add(r, (direct_light_dispatch){.pipeline = state->exact}, &rays, counter);
+    while (light_rays_trace(r, &rays));
 }
 
-static void sample_declare(renderer *r, const direct_light *state, const char *rays_from)
+// Samples of each kind. The references for which it matters have no filter.
+static uint32_t sample_count(const renderer *r)
 {
-    const bool analytic = direct_light_is_analytic(r);
-    direct_light_dispatch dispatch = {
-        .pipeline = analytic ? state->sample_analytic : state->sample,
-        .push.samples = max_u32(1, r->settings.shadow_samples),
-        .push.candidates = r->constants.emitter_count > EXACT_EMITTERS_MAX ? CANDIDATES_MANY : CANDIDATES_FEW,
-        .push.punctual = has_many_punctual(r),
-        .push_size = sizeof dispatch.push,
-    };
-    frame_graph_pass *pass = direct_light_pass_add(r, "direct_light/sample", &dispatch);
-    frame_graph_modify(pass, rays_from, "rays_direct", ACCESS_STORAGE_READ_WRITE);
-    const frame_graph_resource_desc image =
-        frame_graph_image_of(VK_FORMAT_R32G32B32A32_SFLOAT, r->settings.width, r->settings.height);
-    frame_graph_create_resource(pass, "direct_u", &image, ACCESS_STORAGE_WRITE);
-    frame_graph_create_resource(pass, "direct_s", &image, ACCESS_STORAGE_WRITE);
-    if (analytic)
-        frame_graph_create_resource(pass, "direct_analytic", &image, ACCESS_STORAGE_WRITE);
+    return r->settings.method == METHOD_LGH ? max_u32(1, r->settings.shadow_samples) : DIRECT_SAMPLES_MAX;
+}
+
+static uint32_t sampled_layers(const renderer *r)
+{
+    return sample_count(r) * ((r->constants.emitter_count > 0) + has_many_punctual(r));
+}
+
+static void sample_declare(renderer *r, const direct_light *state, light_rays rays, resource_chain *counter)
+{
+    resource_chain unshadowed = {.name = "direct_u", .desc = rays.sum.desc, .length = rays.batches};
+    do {
+        const bool analytic = rays.first == 0 && direct_light_is_analytic(r);
+        const direct_light_dispatch dispatch = {
+            .pipeline = analytic ? state->sample_analytic : state->sample,
+            .push.samples = sample_count(r),
+            .push.candidates = r->constants.emitter_count > EXACT_EMITTERS_MAX ? CANDIDATES_MANY : CANDIDATES_FEW,
+            .push.punctual = has_many_punctual(r),
+        };
+        frame_graph_pass *pass = rays_pass_add(r, dispatch, &rays, counter);
+        resource_chain_next(&unshadowed, pass);
+        if (analytic)
+            frame_graph_create_resource(pass, "direct_analytic", &rays.sum.desc, ACCESS_STORAGE_WRITE);
+    } while (light_rays_trace(r, &rays));
 }
 
 static void direct_light_setup(renderer *r, void *user)
 {
     const direct_light *state = user;
-    const bool exact = has_exact(r), sampled = direct_light_is_sampled(r);
-    if (!exact && !sampled)
+    light_rays exact = {0}, sampled = {0};
+    if (has_exact(r))
+        exact = light_rays_begin(r, "direct_light", "direct", r->constants.light_count);
+    if (direct_light_is_sampled(r))
+        sampled = light_rays_begin(r, "direct_light/sample", "direct_s", sampled_layers(r));
+    if (exact.batches + sampled.batches == 0)
         return;
-    rays_clear_declare(r);
-    if (exact)
-        exact_declare(r, state, sampled ? "rays_direct_exact" : "rays_direct");
-    if (sampled)
-        sample_declare(r, state, exact ? "rays_direct_exact" : "rays_direct_cleared");
+    resource_chain counter =
+        resource_chain_counter(r->graph, "direct_light/clear", "rays_direct", exact.batches + sampled.batches);
+    if (exact.batches > 0)
+        exact_declare(r, state, exact, &counter);
+    if (sampled.batches > 0)
+        sample_declare(r, state, sampled, &counter);
 }
 
 static void direct_light_fini(renderer *r, void *user)

@@ -6,13 +6,14 @@ bool modules_init(renderer *r)
 {
     static bool (*const inits[])(renderer *) = {
         rays_init, // traces the batches of rays that the other passes make
+        light_rays_init, // and sums up the light that those among them bring which nothing is in the way of
         acceleration_init, // top-level acceleration structure over the instances
-        vpl_trace_init, // light paths by ray query, one virtual point light a bounce
+        vpl_trace_init, // light paths, one virtual point light a bounce
         lgh_build_init, // the lighting grid hierarchy over the VPLs
         gbuffer_init, // what each pixel sees
         direct_light_init, // punctual lights and emissive triangles
         light_volume_init, // unshadowed indirect light from the hierarchy, and the shadow samples
-        shadow_init, // ray-query shadows of the samples
+        shadow_init, // shadows of the samples
         interleave_init, // gathers interleaved tiles
         svgf_init, // filters the shadowed and unshadowed estimates alike
         taa_init, // steadies their ratio over time

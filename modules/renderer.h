@@ -40,6 +40,8 @@
 //   display            RGBA8         tone-mapped sRGB                                  tonemap
 //   rays_vpl, rays_direct, rays_shadow, rays_path  uint   of this frame, counted by the pass that makes them
 //   X_origins, X_directions, X_visible, X_hits     buffers  batches of rays and their answers; see rays.h
+//   X_estimates        vec3[rays]    the light that each ray of a batch brings, if nothing is in its way  light_rays
+//   vpl_flux           vec3[paths]   of the light paths at their last hit                             vpl_trace
 #pragma once
 
 #include "engine/ecs.h"

@@ -1,5 +1,5 @@
-// Ray-query shadows of the reservoirs' samples: makes the pair `shadow_u`, `shadow_s`, and counts the rays in
-// `rays_shadow`.
+// Shadows of the reservoirs' samples: makes the pair `shadow_u`, `shadow_s`, and counts the rays in `rays_shadow`.
+#include "light_rays.h"
 #include "modules.h"
 
 #include "lanternfield_renderer_shaders.h"
@@ -15,6 +15,7 @@ typedef struct shadow_pass {
     uint32_t width, height;
     struct {
         uint32_t interleave, emission, start_level, samples;
+        uint32_t first, layers;
         float singularity;
     } push;
 } shadow_pass;
@@ -36,20 +37,21 @@ static gpu_pipeline pipeline_of(renderer *r, shadow *state, uint32_t variant)
 static void execute(const frame_graph_context *context, void *user)
 {
     const shadow_pass *pass = user;
-    gpu_buffer_fill(context->commands, frame_graph_buffer(context, "rays_shadow"), 0, 16, 0);
-    gpu_memory_barrier(context->commands);
     frame_graph_bind(context, pass->pipeline);
     gpu_push(context->commands, &pass->push, sizeof pass->push);
     gpu_dispatch(context->commands, div_up_u32(pass->width, 8), div_up_u32(pass->height, 8), 1);
 }
 
-static void declare_bindings(renderer *r, frame_graph_pass *p)
+// The pass that makes the rays of the current batch.
+static void declare_rays(renderer *r, shadow_pass args, const light_rays *rays, resource_chain *counter,
+                         resource_chain *unshadowed)
 {
-    const render_settings *s = &r->settings;
-    const frame_graph_resource_desc rays = {.kind = FRAME_GRAPH_BUFFER, .size = 16, .host = true};
-    const frame_graph_resource_desc light = frame_graph_image_of(VK_FORMAT_R32G32B32A32_SFLOAT, s->width, s->height);
-    frame_graph_read(p, "tlas", ACCESS_TRACE);
-    frame_graph_create_resource(p, "rays_shadow", &rays, ACCESS_STORAGE_READ_WRITE);
+    args.push.first = rays->first;
+    args.push.layers = rays->count;
+    const frame_graph_pass_desc desc = {
+        .name = rays->pass, .kind = FRAME_GRAPH_COMPUTE, .execute = execute, .user = &args, .user_size = sizeof args};
+    frame_graph_pass *p = frame_graph_pass_add(r->graph, &desc);
+    resource_chain_next(counter, p);
     frame_graph_read(p, "lgh_header", ACCESS_STORAGE_READ);
     frame_graph_read(p, "lgh_lights", ACCESS_STORAGE_READ);
     frame_graph_read(p, "vpls", ACCESS_STORAGE_READ);
@@ -57,9 +59,9 @@ static void declare_bindings(renderer *r, frame_graph_pass *p)
     frame_graph_read(p, "normals", ACCESS_SAMPLED);
     frame_graph_read(p, "indirect", ACCESS_SAMPLED);
     frame_graph_read(p, "reservoirs", ACCESS_STORAGE_READ);
-    frame_graph_create_resource(p, "shadow_u", &light, ACCESS_STORAGE_WRITE);
-    frame_graph_create_resource(p, "shadow_s", &light, ACCESS_STORAGE_WRITE);
-    if (s->end_point == END_POINT_VPL)
+    light_rays_make(r, rays, p);
+    resource_chain_next(unshadowed, p);
+    if (r->settings.end_point == END_POINT_VPL)
         frame_graph_read(p, "lgh_samples", ACCESS_STORAGE_READ);
 }
 
@@ -71,15 +73,18 @@ static void shadow_setup(renderer *r, void *state)
     const uint32_t variant =
         (s->reservoirs == RESERVOIRS_EXACT ? EXACT : 0) | (s->sampling == SAMPLING_UNIFORM ? UNIFORM : 0) |
         (s->end_point == END_POINT_JITTER ? JITTER : 0) | (s->end_point == END_POINT_VPL ? VPL : 0);
-    shadow_pass pass = {
+    const shadow_pass pass = {
         .pipeline = pipeline_of(r, state, variant),
         .width = s->width,
         .height = s->height,
-        .push = {s->interleave, s->emission, s->start_level, s->shadow_samples, renderer_singularity(r)},
+        .push = {s->interleave, s->emission, s->start_level, s->shadow_samples, 0, 0, renderer_singularity(r)},
     };
-    const frame_graph_pass_desc desc = {
-        .name = "shadow", .kind = FRAME_GRAPH_COMPUTE, .execute = execute, .user = &pass, .user_size = sizeof pass};
-    declare_bindings(r, frame_graph_pass_add(r->graph, &desc));
+    light_rays rays = light_rays_begin(r, "shadow", "shadow_s", s->shadow_samples);
+    resource_chain counter = resource_chain_counter(r->graph, "shadow/clear", "rays_shadow", rays.batches);
+    resource_chain unshadowed = {.name = "shadow_u", .desc = rays.sum.desc, .length = rays.batches};
+    do
+        declare_rays(r, pass, &rays, &counter, &unshadowed);
+    while (light_rays_trace(r, &rays));
 }
 
 static void shadow_fini(renderer *r, void *state)

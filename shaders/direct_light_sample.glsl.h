@@ -1,49 +1,52 @@
-// Sampled direct light: a pair of estimates, unshadowed and shadowed, that differ only by the visibility of the same
-// samples. Many punctual lights are sampled by streaming over all of them, emissive triangles by resampled importance
-// sampling (Talbot et al. 2005). The including shader defines ANALYTIC: 1 also writes the unshadowed light exactly.
-#define TLAS_BINDING 2
-#define RAYS_BINDING 3
+// Sampled direct light: shadow rays, each with the light that it stands for. Their sum and that of the visible ones are a
+// pair of estimates that differ by visibility alone. Many punctual lights are sampled by streaming over all of them,
+// emissive triangles by resampled importance sampling (Talbot et al. 2005). The including shader defines ANALYTIC: 1 also
+// writes the unshadowed light exactly.
+#define RAYS_BINDING 2
+#include "ray_count.glsl.h"
+#define RAY_ORIGINS_BINDING 3
+#include "light_rays.glsl.h"
 #include "direct_light.glsl.h"
 #include "emitters.glsl.h"
-#include "ray.glsl.h"
-#include "ray_count.glsl.h"
 
 layout(local_size_x = 8, local_size_y = 8) in;
 layout(set = 0, binding = 0) uniform sampler2D depth_map;
 layout(set = 0, binding = 1) uniform sampler2D normal_map;
-layout(set = 0, binding = 4, rgba32f) uniform writeonly image2D direct_u;
-layout(set = 0, binding = 5, rgba32f) uniform writeonly image2D direct_s;
+layout(set = 0, binding = 6, rgba32f) uniform image2D direct_u;
 #if ANALYTIC
-layout(set = 0, binding = 6, rgba32f) uniform writeonly image2D direct_analytic;
+layout(set = 0, binding = 7, rgba32f) uniform writeonly image2D direct_analytic;
 #endif
+// The rays' layers: `samples` of the punctual lights, where they are sampled here, then `samples` of the emissive
+// triangles, where there are any.
 layout(push_constant, scalar) uniform push_block {
-    uint samples;    // of each kind, 1 to SAMPLES_MAX
-    uint candidates; // of each sample of the emissive triangles
-    uint punctual;   // 1: the punctual lights are sampled here
+    uint first, layers; // of this batch
+    uint samples;       // of each kind, 1 to DIRECT_SAMPLES_MAX
+    uint candidates;    // of each sample of the emissive triangles
+    uint punctual;      // 1: the punctual lights are sampled here
 } push;
 
-const uint SAMPLES_MAX = 8u;
-
 struct direct_estimate {
-    vec3 unshadowed, shadowed;
-    vec3 exact; // unshadowed, without noise
+    vec3 unshadowed;
+    vec3 exact; // the same without noise
     uint rays;
 };
 
-void estimate_add(inout direct_estimate estimate, vec3 light, vec3 origin, vec3 direction, float distance)
+uint ray_of_layer(uvec2 pixel, uint layer) { return light_ray_index(pixel, layer - push.first); }
+
+void make_ray(uint index, vec3 light, vec3 origin, vec3 direction, float distance, inout direct_estimate estimate)
 {
     light /= float(push.samples);
     estimate.unshadowed += light;
     estimate.rays++;
-    if (ray_visible(origin, direction, distance))
-        estimate.shadowed += light;
+    light_ray_write(index, origin, direction, distance, light);
 }
 
 // Reservoirs of size one: a light replaces the kept one with its share of the weights so far. The random numbers are
 // keyed by light and sample, not drawn in turn.
-void sample_punctual(gbuffer_point point, vec3 origin, uint key, inout direct_estimate estimate)
+void sample_punctual(uvec2 pixel, gbuffer_point point, vec3 origin, uint key, inout direct_estimate estimate)
 {
-    uint chosen[SAMPLES_MAX];
+    uint chosen[DIRECT_SAMPLES_MAX];
+    uint end = min(push.first + push.layers, push.samples);
     float total = 0.0;
     for (uint i = 0u; i < frame.light_count; i++) {
         vec3 light = punctual_arrival(lights[i], point).light;
@@ -53,15 +56,18 @@ void sample_punctual(gbuffer_point point, vec3 origin, uint key, inout direct_es
         estimate.exact += light;
         total += weight;
         uint light_key = hash(key, i);
-        for (uint s = 0u; s < push.samples; s++)
+        for (uint s = push.first; s < end; s++)
             if (total == weight || unit_float(hash(light_key, s)) * total < weight)
                 chosen[s] = i;
     }
-    if (total <= 0.0)
-        return;
-    for (uint s = 0u; s < push.samples; s++) {
+    for (uint s = push.first; s < end; s++) {
+        uint ray = ray_of_layer(pixel, s);
+        if (total <= 0.0) {
+            light_ray_write_none(ray);
+            continue;
+        }
         light_arrival a = punctual_arrival(lights[chosen[s]], point);
-        estimate_add(estimate, a.light * (total / luminance(a.light)), origin, a.direction, 0.9999 * a.distance);
+        make_ray(ray, a.light * (total / luminance(a.light)), origin, a.direction, 0.9999 * a.distance, estimate);
     }
 }
 
@@ -98,49 +104,55 @@ emitter_choice emitter_choose(gbuffer_point point, uint key, float share)
     return choice;
 }
 
-void sample_emitters(gbuffer_point point, vec3 origin, uint key, inout direct_estimate estimate)
+void sample_emitters(uvec2 pixel, gbuffer_point point, vec3 origin, uint key, inout direct_estimate estimate)
 {
     float share = emitter_share();
-    for (uint s = 0u; s < push.samples; s++) {
-        emitter_choice choice = emitter_choose(point, hash(key, s), share);
-        if (choice.light == vec3(0.0))
+    uint before = push.punctual * push.samples;
+    for (uint layer = max(push.first, before); layer < push.first + push.layers; layer++) {
+        uint ray = ray_of_layer(pixel, layer);
+        emitter_choice choice = emitter_choose(point, hash(key, layer - before), share);
+        if (choice.light == vec3(0.0)) {
+            light_ray_write_none(ray);
             continue;
+        }
         emissive_triangle e = emitters[choice.triangle];
         vec3 end = e.corner + choice.barycentrics.x * e.edge1 + choice.barycentrics.y * e.edge2;
         // Off the emitter's plane on the lit side, so that the ray cannot hit the emitter itself.
         vec3 side = dot(e.normal, point.position - e.corner) > 0.0 ? e.normal : -e.normal;
         vec3 path = offset_origin(end, side, frame.scene_radius) - origin;
         float distance = max(length(path), 1e-12);
-        estimate_add(estimate, choice.light, origin, path / distance, distance);
+        make_ray(ray, choice.light, origin, path / distance, distance, estimate);
     }
 }
 
-direct_estimate shade(uvec2 pixel, gbuffer_point point)
+void make_rays(uvec2 pixel, gbuffer_point point, inout direct_estimate estimate)
 {
-    direct_estimate estimate = direct_estimate(vec3(0.0), vec3(0.0), vec3(0.0), 0u);
     vec3 origin = offset_origin(point.position, point.geometric, frame.scene_radius);
     uint key = hash(pixel.x | pixel.y << 16, frame.frame, frame.seed);
-    if (push.punctual != 0u)
-        sample_punctual(point, origin, hash(key, 1u), estimate);
+    if (push.first < push.punctual * push.samples)
+        sample_punctual(pixel, point, origin, hash(key, 1u), estimate);
     if (frame.emitter_count > 0u)
-        sample_emitters(point, origin, hash(key, 2u), estimate);
+        sample_emitters(pixel, point, origin, hash(key, 2u), estimate);
 #if ANALYTIC
     for (uint i = 0u; i < frame.emitter_count; i++)
         estimate.exact += emitter_light_exact(emitters[i], point);
 #endif
-    return estimate;
 }
 
 void main()
 {
     uvec2 pixel = gl_GlobalInvocationID.xy;
-    direct_estimate estimate = direct_estimate(vec3(0.0), vec3(0.0), vec3(0.0), 0u);
+    direct_estimate estimate = direct_estimate(vec3(0.0), vec3(0.0), 0u);
     if (all(lessThan(pixel, uvec2(frame.width, frame.height)))) {
+        if (push.first > 0u)
+            estimate.unshadowed = imageLoad(direct_u, ivec2(pixel)).rgb;
         gbuffer_point point;
         if (gbuffer_read(depth_map, normal_map, pixel, point))
-            estimate = shade(pixel, point);
+            make_rays(pixel, point, estimate);
+        else
+            for (uint i = 0u; i < push.layers; i++)
+                light_ray_write_none(light_ray_index(pixel, i));
         imageStore(direct_u, ivec2(pixel), vec4(estimate.unshadowed, 0.0));
-        imageStore(direct_s, ivec2(pixel), vec4(estimate.shadowed, 0.0));
 #if ANALYTIC
         imageStore(direct_analytic, ivec2(pixel), vec4(estimate.exact, 0.0));
 #endif

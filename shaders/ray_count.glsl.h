@@ -3,6 +3,8 @@
 #ifndef RAY_COUNT_GLSL_H
 #define RAY_COUNT_GLSL_H
 
+#extension GL_EXT_scalar_block_layout : require
+
 layout(set = 0, binding = RAYS_BINDING, scalar) buffer rays_block { uint rays_traced; };
 
 shared uint group_rays;

@@ -16,12 +16,12 @@ void ray_write(uint index, vec3 origin, vec3 direction, float reach)
     ray_directions[index] = vec4(direction, 0.0);
 }
 
-// Towards a point: shortened by what rounding may add at the far end.
+// Towards a point: shortened by what rounding may add at the far end. One at the origin itself leaves a ray still.
 void ray_write_to(uint index, vec3 origin, vec3 end)
 {
     vec3 offset = end - origin;
-    float reach = length(offset);
-    ray_write(index, origin, offset / max(reach, 1e-20), reach * 0.9999);
+    float reach = max(length(offset), 1e-20);
+    ray_write(index, origin, offset / reach, reach * 0.9999);
 }
 
 void ray_write_none(uint index) { ray_origins[index].w = 0.0; }

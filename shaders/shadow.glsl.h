@@ -1,35 +1,35 @@
-// Traces the shadow samples: for each pixel and reservoir a ray towards a point of the chosen light. U is the unshadowed
-// estimate from the samples, S the same times visibility, so S / U is the shadow ratio (Heitz et al. 2018; Lin and Yuksel
-// 2019, section 3.3).
+// Makes the shadow rays: for each pixel and reservoir one towards a point of the chosen light, with the estimate of the
+// light that it stands for. U is the sum of the estimates, S that of the visible ones (modules/light_rays.h), so S / U is
+// the shadow ratio (Heitz et al. 2018; Lin and Yuksel 2019, section 3.3).
 #ifndef SHADOW_GLSL_H
 #define SHADOW_GLSL_H
 
-#define TLAS_BINDING 0
-#include "ray.glsl.h"
-#define RAYS_BINDING 1
+#define RAYS_BINDING 0
 #include "ray_count.glsl.h"
+#define RAY_ORIGINS_BINDING 8
+#include "light_rays.glsl.h"
 #include "gbuffer.glsl.h"
 #include "interleave.glsl.h"
 #include "lgh_shade.glsl.h"
 #include "reservoir.glsl.h"
 
 layout(local_size_x = 8, local_size_y = 8) in;
-layout(set = 0, binding = 2, scalar) readonly buffer header_block { lgh_header header; };
-layout(set = 0, binding = 3, scalar) readonly buffer grid_lights_block { grid_light grid_lights[]; };
-layout(set = 0, binding = 4, scalar) readonly buffer vpls_block { vpl vpls[]; };
-layout(set = 0, binding = 5) uniform sampler2D depth_map;
-layout(set = 0, binding = 6) uniform sampler2D normal_map;
-layout(set = 0, binding = 7) uniform sampler2D indirect_map;
-layout(set = 0, binding = 8, scalar) readonly buffer keys_block { uint64_t reservoir_keys[]; };
-layout(set = 0, binding = 8, scalar) readonly buffer words_block { uint reservoir_words[]; };
-layout(set = 0, binding = 9, rgba32f) writeonly uniform image2D shadow_u;
-layout(set = 0, binding = 10, rgba32f) writeonly uniform image2D shadow_s;
+layout(set = 0, binding = 1, scalar) readonly buffer header_block { lgh_header header; };
+layout(set = 0, binding = 2, scalar) readonly buffer grid_lights_block { grid_light grid_lights[]; };
+layout(set = 0, binding = 3, scalar) readonly buffer vpls_block { vpl vpls[]; };
+layout(set = 0, binding = 4) uniform sampler2D depth_map;
+layout(set = 0, binding = 5) uniform sampler2D normal_map;
+layout(set = 0, binding = 6) uniform sampler2D indirect_map;
+layout(set = 0, binding = 7, scalar) readonly buffer keys_block { uint64_t reservoir_keys[]; };
+layout(set = 0, binding = 7, scalar) readonly buffer words_block { uint reservoir_words[]; };
+layout(set = 0, binding = 11, rgba32f) uniform image2D shadow_u;
 #ifdef END_POINT_VPL
-layout(set = 0, binding = 11, scalar) readonly buffer samples_block { uvec4 samples[]; };
+layout(set = 0, binding = 12, scalar) readonly buffer samples_block { uvec4 samples[]; };
 #endif
 layout(push_constant, scalar) uniform push_block {
     uint interleave, emission, start_level, samples;
-    float singularity; // b, metres
+    uint first, layers; // samples of this batch
+    float singularity;  // b, metres
 } push;
 
 layout(constant_id = 0) const bool EXACT = true;
@@ -82,44 +82,51 @@ shadow_sample grid_sample(uint index, gbuffer_point p, uint random)
     return s;
 }
 
-// Adds one sample to U and S; returns the number of rays.
-uint shade_sample(uint light, float f_sum, gbuffer_point p, uint random, inout vec3 u, inout vec3 s)
+// The part of the pixel's light that a sample stands for; black: it has none.
+vec3 sample_estimate(uint light, float f_sum, gbuffer_point p, uint random, out vec3 end)
 {
+    end = p.position;
+    if (light == RESERVOIR_EMPTY)
+        return vec3(0.0);
     bool is_vpl = (light & RESERVOIR_VPL) != 0u;
     shadow_sample chosen = is_vpl ? vpl_sample(light & ~RESERVOIR_VPL, p) : grid_sample(light, p, random);
+    end = chosen.end;
     float f = UNIFORM ? 1.0 : luminance(chosen.centre_light);
-    vec3 estimate = f > 0.0 ? chosen.end_light * (f_sum / (f * float(push.samples))) : vec3(0.0);
-    if (luminance(estimate) <= 0.0)
+    return f > 0.0 ? chosen.end_light * (f_sum / (f * float(push.samples))) : vec3(0.0);
+}
+
+// Makes the ray of the batch's sample i where it has light, and adds that to U. Returns the number of rays.
+uint make_ray(uvec2 pixel, uint i, float f_sum, gbuffer_point p, inout vec3 u)
+{
+    uint index = pixel.y * frame.width + pixel.x, s = push.first + i, ray = light_ray_index(pixel, i);
+    uint random = hash(hash(index, frame.frame, frame.seed), 0x51ed270bu, s);
+    vec3 end;
+    vec3 estimate = sample_estimate(reservoir_light(index, s), f_sum, p, random, end);
+    if (luminance(estimate) <= 0.0) {
+        light_ray_write_none(ray);
         return 0u;
+    }
     u += estimate;
-    vec3 origin = offset_origin(p.position, p.geometric, frame.scene_radius);
-    vec3 offset = chosen.end - origin;
-    float reach = length(offset);
-    if (ray_visible(origin, offset / max(reach, 1e-20), reach * 0.9999))
-        s += estimate;
+    light_ray_write_to(ray, offset_origin(p.position, p.geometric, frame.scene_radius), end, estimate);
     return 1u;
 }
 
 void main()
 {
     uvec2 pixel = gl_GlobalInvocationID.xy, size = uvec2(frame.width, frame.height);
-    vec3 u = vec3(0.0), s = vec3(0.0);
     uint rays = 0u;
-    gbuffer_point point;
-    bool inside = all(lessThan(pixel, size));
-    if (inside && gbuffer_read(depth_map, normal_map, pixel, point)) {
-        float f_sum = texelFetch(indirect_map, ivec2(interleave_texel(pixel, push.interleave, size)), 0).a;
-        uint index = pixel.y * size.x + pixel.x;
-        for (uint i = 0u; f_sum > 0.0 && i < push.samples; i++) {
-            uint light = reservoir_light(index, i);
-            uint random = hash(hash(index, frame.frame, frame.seed), 0x51ed270bu, i);
-            if (light != RESERVOIR_EMPTY)
-                rays += shade_sample(light, f_sum, point, random, u, s);
-        }
-    }
-    if (inside) {
+    if (all(lessThan(pixel, size))) {
+        vec3 u = push.first == 0u ? vec3(0.0) : imageLoad(shadow_u, ivec2(pixel)).rgb;
+        gbuffer_point point;
+        float f_sum = 0.0;
+        if (gbuffer_read(depth_map, normal_map, pixel, point))
+            f_sum = texelFetch(indirect_map, ivec2(interleave_texel(pixel, push.interleave, size)), 0).a;
+        for (uint i = 0u; i < push.layers; i++)
+            if (f_sum > 0.0)
+                rays += make_ray(pixel, i, f_sum, point, u);
+            else
+                light_ray_write_none(light_ray_index(pixel, i));
         imageStore(shadow_u, ivec2(pixel), vec4(u, 0.0));
-        imageStore(shadow_s, ivec2(pixel), vec4(s, 0.0));
     }
     ray_count(rays);
 }

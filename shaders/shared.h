@@ -146,6 +146,8 @@ SHARED_STRUCT(ray_hit) {
     SHARED_VEC2(barycentrics); // weights of its second and third corner
 } SHARED_END(ray_hit, 20)
 
+#define DIRECT_SAMPLES_MAX 8 // shadow rays a pixel for each kind of sampled direct light
+
 // ---- Path tracing
 
 SHARED_STRUCT(path_state) {

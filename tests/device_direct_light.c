@@ -2,9 +2,11 @@
 #include "test.h"
 
 #include "modules/direct_light.h"
+#include "modules/rays.h"
 #include "modules/world.h"
 
 #include <math.h>
+#include <string.h>
 
 #define SCENES "../shared/scenes/cornell/"
 enum { SIDE = 96 };
@@ -71,20 +73,20 @@ static void point_light_add(renderer *r, vec position, double candela)
     *(light_component *)ecs_add(r->world, e, w->light) = (light_component){.type = LIGHT_POINT, .color = {c, c, c}};
 }
 
-static const texel *image_read(renderer *r, const char *name, texel *texels)
+static void image_read(renderer *r, const char *name, texel *texels)
 {
     const gpu_image image = frame_graph_find_image(r->graph, name);
+    const size_t size = sizeof(texel) * r->settings.width * r->settings.height;
     CHECK(image.id != 0);
     if (image.id)
-        CHECK(gpu_image_read(device, image, VK_IMAGE_LAYOUT_TRANSFER_SRC_OPTIMAL, texels, sizeof(texel) * SIDE * SIDE));
-    return (const texel *)texels;
+        CHECK(gpu_image_read(device, image, VK_IMAGE_LAYOUT_TRANSFER_SRC_OPTIMAL, texels, size));
 }
 
 // Where the middle of a pixel meets the floor y = 0.
 static vec floor_point(const renderer *r, uint32_t x, uint32_t y)
 {
     const frame_constants *c = &r->constants;
-    const double across = (x + 0.5) / SIDE * 2 - 1, down = (y + 0.5) / SIDE * 2 - 1;
+    const double across = (x + 0.5) / c->width * 2 - 1, down = (y + 0.5) / c->height * 2 - 1;
     double ray[3];
     for (int k = 0; k < 3; k++)
         ray[k] = c->forward[k] + across * c->right[k] - down * c->up[k];
@@ -92,21 +94,24 @@ static vec floor_point(const renderer *r, uint32_t x, uint32_t y)
     return (vec){c->eye[0] + t * ray[0], 0, c->eye[2] + t * ray[2]};
 }
 
-// Pixels of the floor, in the middle and aside.
+// Pixels of the floor, in the middle and aside, of a picture of SIDE x SIDE.
 static const uint32_t places[][2] = {{48, 48}, {20, 60}, {70, 40}, {48, 80}, {30, 30}};
 
 // `irradiance` in lux (nits times pi) at each place against the picture.
 static void radiance_check(renderer *r, double (*irradiance)(vec p), double tolerance)
 {
-    static texel radiance[SIDE * SIDE];
+    const uint32_t width = r->settings.width, height = r->settings.height;
+    texel *radiance = memory_alloc(sizeof(texel) * width * height);
     image_read(r, "radiance", radiance);
     for (size_t i = 0; i < countof(places); i++) {
-        const double e = irradiance(floor_point(r, places[i][0], places[i][1]));
+        const uint32_t x = places[i][0] * width / SIDE, y = places[i][1] * height / SIDE;
+        const double e = irradiance(floor_point(r, x, y));
         for (int k = 0; k < 3; k++) {
             const double expected = albedo[k] * e / M_PI;
-            CHECK_NEAR((double)radiance[places[i][1] * SIDE + places[i][0]][k], expected, tolerance * expected);
+            CHECK_NEAR((double)radiance[y * width + x][k], expected, tolerance * expected);
         }
     }
+    free(radiance);
 }
 
 // ---- Closed forms, lux
@@ -317,6 +322,84 @@ TEST(shadowed_samples_of_many_lights_and_a_lamp_average_to_what_is_visible)
     fixture_destroy(&f);
 }
 
+// ---- Several batches: more rays than RAYS_BATCH
+
+enum { LARGE = 728, FEW = 8 }; // 7 rays a pixel fit into one batch
+
+static double irradiance_of_few(vec p)
+{
+    double sum = irradiance_of_point(p);
+    for (int i = 0; i < FEW; i++)
+        sum += point_irradiance(p, many_position(i), 1 + i);
+    return sum;
+}
+
+static fixture large_fixture_create(int lights)
+{
+    fixture f = fixture_create("plane_point.gltf");
+    f.r->settings.width = f.r->settings.height = LARGE;
+    f.r->settings.filter = f.r->settings.taa = false;
+    f.r->settings.shadow_samples = 8;
+    f.r->exports[f.r->export_count++] = "rays_direct";
+    for (int i = 0; i < lights; i++)
+        point_light_add(f.r, many_position(i), 1 + i);
+    return f;
+}
+
+static uint32_t rays_of_pixel(const fixture *f, uint32_t pixels)
+{
+    const uint32_t *rays = gpu_buffer_map(device, frame_graph_find_buffer(f->r->graph, "rays_direct"));
+    CHECK(rays[0] % pixels == 0);
+    return rays[0] / pixels;
+}
+
+// Pixels of the floor that any light reaches.
+static uint32_t lit_pixels(renderer *r, const char *name, texel *texels)
+{
+    uint32_t lit = 0;
+    image_read(r, name, texels);
+    for (uint32_t i = 0; i < LARGE * LARGE; i++)
+        lit += texels[i][0] > 0;
+    CHECK(lit > LARGE * LARGE / 4);
+    return lit;
+}
+
+TEST(lights_of_two_batches_sum_up_exactly)
+{
+    static texel direct[LARGE * LARGE];
+    fixture f = large_fixture_create(FEW);
+    CHECK(rays_layers(f.r, FEW + 1) < FEW + 1);
+    f.r->exports[f.r->export_count++] = "direct";
+    CHECK(renderer_frame(f.r));
+    radiance_check(f.r, irradiance_of_few, 1e-3);
+    CHECK(rays_of_pixel(&f, lit_pixels(f.r, "direct", direct)) == FEW + 1);
+    fixture_destroy(&f);
+}
+
+// With nothing in the way the two estimates are the same to the bit, and right on average.
+TEST(samples_of_two_batches_are_each_taken_once)
+{
+    static texel unshadowed[LARGE * LARGE], shadowed[LARGE * LARGE], analytic[LARGE * LARGE];
+    static const char *const names[] = {"direct_u", "direct_s", "direct_analytic"};
+    fixture f = large_fixture_create(MANY);
+    CHECK(rays_layers(f.r, 8) < 8);
+    for (size_t i = 0; i < countof(names); i++)
+        f.r->exports[f.r->export_count++] = names[i];
+    CHECK(renderer_frame(f.r));
+    image_read(f.r, "direct_u", unshadowed);
+    image_read(f.r, "direct_s", shadowed);
+    CHECK(memcmp(unshadowed, shadowed, sizeof shadowed) == 0);
+    CHECK(rays_of_pixel(&f, lit_pixels(f.r, "direct_analytic", analytic)) == 8);
+    double sampled = 0, exact = 0;
+    for (uint32_t i = 0; i < LARGE * LARGE; i++) {
+        sampled += (double)unshadowed[i][0];
+        exact += (double)analytic[i][0];
+    }
+    printf("  samples over closed form: %.5f\n", sampled / exact);
+    CHECK_NEAR(sampled / exact, 1, 0.005);
+    fixture_destroy(&f);
+}
+
 TEST(rays_are_counted)
 {
     fixture f = fixture_create("plane_point.gltf");
@@ -372,6 +455,8 @@ int main(void)
     RUN(lamp_casts_the_shadow_of_a_point_light);
     RUN(many_lights_sum_up_exactly);
     RUN(shadowed_samples_of_many_lights_and_a_lamp_average_to_what_is_visible);
+    RUN(lights_of_two_batches_sum_up_exactly);
+    RUN(samples_of_two_batches_are_each_taken_once);
     RUN(rays_are_counted);
     RUN(indirect_only_has_no_direct_light);
     RUN(validation_layer_is_silent);

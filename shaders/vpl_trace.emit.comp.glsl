@@ -1,16 +1,18 @@
-// Traces light paths and leaves one virtual point light at each diffuse hit (Keller 1997; Lin and Yuksel 2019, section 4).
-// One invocation a path: a light source is chosen by power, a ray leaves it, and each of `bounces` hits fills one slot.
+// The first rays of light paths: a light source is chosen by power, and a ray leaves it. One invocation a path.
 #version 460
 #extension GL_GOOGLE_include_directive : require
-#define TLAS_BINDING 0
-#include "ray.glsl.h"
-#include "sobol.glsl.h"
-#define RAYS_BINDING 2
+#define RAYS_BINDING 0
 #include "ray_count.glsl.h"
+#define RAY_ORIGINS_BINDING 1
+#include "rays.glsl.h"
+#include "sobol.glsl.h"
 
 layout(local_size_x = 64) in;
-layout(set = 0, binding = 1, scalar) writeonly buffer vpls_block { vpl vpls[]; };
-layout(push_constant, scalar) uniform push_block { uint path_count, slot_count, bounces; } push;
+layout(set = 0, binding = 3, scalar) writeonly buffer flux_block { vec3 flux[]; };
+layout(push_constant, scalar) uniform push_block {
+    uint path_count;
+    uint ray_count; // paths, and one without a ray where there are slots that no path fills
+} push;
 
 struct light_ray {
     vec3 origin, direction;
@@ -105,42 +107,15 @@ light_ray emit(uint path)
     return ray;
 }
 
-void clear_slots(uint path, uint bounce)
-{
-    for (uint i = bounce; i < push.bounces && path * push.bounces + i < push.slot_count; i++)
-        vpls[path * push.bounces + i].intensity = 0.0;
-}
-
-// Returns the number of rays traced.
-uint trace_path(uint path)
-{
-    light_ray ray = emit(path);
-    uint bounce = 0u;
-    for (; bounce < push.bounces && path * push.bounces + bounce < push.slot_count; bounce++) {
-        surface_hit hit;
-        if (!ray_nearest(ray.origin, ray.direction, 1e30, hit)) {
-            clear_slots(path, bounce);
-            return bounce + 1u;
-        }
-        surface s = hit_surface(hit);
-        vec3 normal = dot(s.normal, ray.direction) < 0.0 ? s.normal : -s.normal;
-        ray.origin = offset_origin(s.position, normal, frame.scene_radius);
-        ray.flux *= s.albedo;
-        vec3 color = ray.flux / PI;
-        vpls[path * push.bounces + bounce] = vpl(ray.origin, luminance(color), color, path, normal, bounce);
-        vec4 u = sobol(path, 2u + bounce, frame.seed);
-        ray.direction = basis_of(normal) * cosine_direction(u.xy);
-    }
-    return bounce;
-}
-
 void main()
 {
     uint path = gl_GlobalInvocationID.x;
-    uint traced = 0u;
-    if (path < push.path_count)
-        traced = trace_path(path);
-    else // the slots that no path fills
-        clear_slots(path, 0u);
-    ray_count(traced);
+    bool launched = path < push.path_count;
+    if (launched) {
+        light_ray ray = emit(path);
+        ray_write(path, ray.origin, ray.direction, RAY_FAR);
+        flux[path] = ray.flux;
+    } else if (path < push.ray_count)
+        ray_write_none(path);
+    ray_count(uint(launched));
 }
