@@ -89,6 +89,12 @@ static void restart(progressive *state)
     state->error = NAN;
 }
 
+bool progressive_is_fresh(renderer *r)
+{
+    const progressive *state = state_of(r);
+    return state->done == 0 || (!state->loaded && (state->key != key_of(r) || !progressive_is(r)));
+}
+
 void progressive_restart(renderer *r)
 {
     restart(state_of(r));
@@ -156,7 +162,9 @@ typedef struct state_header {
     char magic[8];
     uint32_t version, width, height, identity_size;
     uint64_t done;
+    uint64_t frame; // the renderer's, which keys the random numbers of direct light
     double rays;
+    double error; // NAN: not known
 } state_header;
 
 static const char state_magic[8] = {'L', 'F', 'S', 'T', 'A', 'T', 'E', '\n'};
@@ -175,13 +183,16 @@ bool progressive_save(renderer *r, const char *path, const char *identity)
         return false;
     }
     rays_collect(r, state);
+    state->error = error_measure(r, state);
     state_header header = {
         .version = STATE_VERSION,
         .width = state->width,
         .height = state->height,
         .identity_size = (uint32_t)strlen(identity),
         .done = state->done,
+        .frame = r->frame,
         .rays = state->rays,
+        .error = state->error,
     };
     memcpy(header.magic, state_magic, sizeof header.magic);
     const size_t sums_at = sizeof header + header.identity_size, hash_at = sums_at + sums_size(state->width, state->height);
@@ -287,7 +298,9 @@ bool progressive_load(renderer *r, const char *path, const char *identity)
         restart(state);
         state->loaded = true;
         state->done = header.done;
+        r->frame = (uint32_t)header.frame;
         state->rays = header.rays;
+        state->error = header.error;
     }
     free(bytes);
     return ok;
@@ -304,11 +317,10 @@ static void clear_execute(const frame_graph_context *context, void *user)
 uint64_t progressive_begin(renderer *r, uint64_t total)
 {
     progressive *state = state_of(r);
-    const uint64_t key = key_of(r);
-    if (!state->loaded && (key != state->key || !progressive_is(r)))
+    if (progressive_is_fresh(r))
         restart(state);
     state->loaded = false;
-    state->key = key;
+    state->key = key_of(r);
     state->total = total;
     if (!sums_reserve(r, state)) {
         r->failed = true;

@@ -28,7 +28,8 @@ progressive_status progressive_status_get(renderer *r, bool measure);
 // The state as a file, written beside and renamed; a read-back that changes nothing of what follows. `identity` is text
 // that names everything that the sums depend on (scene, camera, settings); loading fails with one logged line when it
 // differs (the first line that does is named), when the file is damaged, or when it is none. Load before a frame, with
-// settings' size set; that frame takes the sums as they are. A state may be continued with another spp or until.
+// settings' size set; that frame takes the sums as they are, and the status before it is that of the state (total 0).
+// A state may be continued with another spp or until.
 // Numbers are stored as the machine has them (little-endian).
 bool progressive_save(renderer *r, const char *path, const char *identity);
 bool progressive_load(renderer *r, const char *path, const char *identity);
@@ -40,6 +41,7 @@ void progressive_restart(renderer *r);
 // zero where `done` is 0. The method modifies it to "sums", counts what this frame adds, and has the picture made. One
 // storage buffer holds both halves, so where maxStorageBufferRange is 128 MiB pictures have at most 4,194,304 pixels;
 // larger ones fail with a line.
+bool progressive_is_fresh(renderer *r); // this frame begins anew: `done` is 0 before it
 uint64_t progressive_begin(renderer *r, uint64_t total); // imports "sums_before"; returns `done` before this frame
 // This frame adds `count` to `done`; makes "radiance" of "sums" and the two factors. `halves`: sums[0] holds the even
 // samples' and sums[1] the odd ones', counted from 0. With count = 0 "sums" need not exist.
