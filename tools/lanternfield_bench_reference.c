@@ -78,6 +78,22 @@ static char *identity_with_length(const render_session *session, const render_re
     return text;
 }
 
+// Which reference it is, and what is left of it or of its budget.
+static void progress_print(const bench_reference_desc *desc, const progressive_run *run, double seconds)
+{
+    const progressive_status *const now = &run->now;
+    const double here = (double)(now->done - run->before.done), budget = desc->reference->budget_s;
+    double left = here > 0 ? (time_now() - run->start) / here * (double)(now->total - now->done) : 0;
+    left = budget > 0 ? fmin(left, fmax(0, budget - seconds)) : left;
+    char error[32] = "";
+    if (!isnan(now->error)) {
+        snprintf(error, sizeof(error), "  error %.2g %%", 100 * now->error);
+    }
+    progress_show(left < 90 ? "%s  %llu/%llu%s  at most %.0f s left" : "%s  %llu/%llu%s  at most %.0f min left",
+                  desc->title, (unsigned long long)now->done, (unsigned long long)now->total, error,
+                  left < 90 ? left : left / 60);
+}
+
 // Renders from where the state is until the method is finished or the budget is spent.
 static int progressive_render(const bench_reference_desc *desc, const render_request *request,
                               const reference_files *files, const char *identity, reference_info *info)
@@ -103,6 +119,7 @@ static int progressive_render(const bench_reference_desc *desc, const render_req
         }
         progressive_run_step(&run, r);
         info->seconds = before + time_now() - run.start;
+        progress_print(desc, &run, info->seconds);
         info->done = run.now.done;
         info->finished = run.now.finished;
         enough = info->finished || (budget > 0 && info->seconds >= budget);
