@@ -13,8 +13,12 @@ typedef struct image_measures {
     double hdr_flip_mean, hdr_flip_p95, hdr_flip_p99; // HDR-FLIP (Andersson et al. 2021), 0 to 1
 } image_measures;
 
+// Of two images without light the errors are 0 and the energy is 1; against a reference without light they are
+// infinite.
+//
 // `ev`: exposure of the tone-mapped measures, L * 2^ev through the renderer's own tone curve; NAN: the reference's
-// log-average at 0.18, as the renderer does by itself. `maps` may be NULL, else takes width * height values each:
+// log-average at 0.18, as the renderer does by itself. `maps` may be NULL, else takes width * height values each.
+// False, and one logged line, when a value is not finite.
 typedef struct image_maps {
     float *flip; // LDR-FLIP per pixel, 0 to 1
     float *difference; // (luminance of i - r) / mean luminance of r, signed
@@ -34,10 +38,11 @@ typedef struct image_measure_info {
 const image_measure_info *image_measure_table(uint32_t *count);
 
 // ---- Colour maps: value in [0,1] to 8-bit sRGB.
-void color_map_sequential(float value, uint8_t rgb[3]); // dark to bright, perceptually even ("magma" as in FLIP)
+void color_map_sequential(float value,
+                          uint8_t rgb[3]); // dark to bright, perceptually even ("magma", as FLIP's papers use)
 void color_map_diverging(float value, uint8_t rgb[3]); // 0 blue, 0.5 white-ish, 1 red
 
-// The exposure that puts the log-average luminance at 0.18, and the tone-mapped 8-bit sRGB picture as tonemap.comp makes
-// it.
+// The exposure in EV that puts the log-average luminance of the lit pixels at 0.18 (0 without any), and the tone-mapped
+// 8-bit sRGB picture as tonemap.comp makes it, to one step.
 double image_exposure(const float *image, uint32_t width, uint32_t height);
 void image_tonemap(const float *image, uint32_t width, uint32_t height, double ev, uint8_t *rgb);

@@ -51,6 +51,24 @@ triangle() { # triangle NAME EXTRA: a scene of one triangle without light
 EOT
 }
 
+exr() { # exr NAME A B: a picture of two grey pixels; their four bytes each as printf writes them
+  local zero='\0\0\0\0' one='\0\0\200\77'
+  {
+    printf '\166\57\61\1\2\0\0\0'
+    printf 'channels\0chlist\0\23\0\0\0Y\0\2\0\0\0\0\0\0\0\1\0\0\0\1\0\0\0\0'
+    printf 'compression\0compression\0\1\0\0\0\0'
+    printf "dataWindow\0box2i\0\20\0\0\0$zero$zero\1\0\0\0$zero"
+    printf "displayWindow\0box2i\0\20\0\0\0$zero$zero\1\0\0\0$zero"
+    printf 'lineOrder\0lineOrder\0\1\0\0\0\0'
+    printf "pixelAspectRatio\0float\0\4\0\0\0$one"
+    printf "screenWindowCenter\0v2f\0\10\0\0\0$zero$zero"
+    printf "screenWindowWidth\0float\0\4\0\0\0$one\0"
+  } >"$1"
+  # One row: where it begins, its number, its size.
+  printf "\\$(printf %o $((($(wc -c <"$1") + 8) % 256)))\\$(printf %o $((($(wc -c <"$1") + 8) / 256)))\0\0$zero" >>"$1"
+  printf "$zero\10\0\0\0$2$3" >>"$1"
+}
+
 echo "wrong usage"
 refuses 2 "command is missing"
 refuses 2 "unknown command draw" draw x.glb
@@ -58,6 +76,16 @@ refuses 2 "needs a SCENE" render
 refuses 2 "needs a SCENE" info
 refuses 2 "other.glb" info "$cornell" other.glb
 refuses 2 "no argument" devices all
+refuses 2 "at least one image" compare
+refuses 2 "at least one image" compare a.exr
+refuses 2 "unknown option --maps" compare a.exr b.exr --maps=a.png
+refuses 2 "unknown option -j" compare a.exr b.exr -j
+refuses 2 "--map: its value is missing" compare a.exr b.exr --map
+refuses 2 "--json=1: it takes no value" compare a.exr b.exr --json=1
+refuses 2 ".png" compare a.exr b.exr --map a.exr
+refuses 2 "difference or flip" compare a.exr b.exr --map-kind hue
+refuses 2 "--map-range: expected a number" compare a.exr b.exr --map-range wide
+refuses 2 "--exposure" compare a.exr b.exr --exposure bright
 refuses 2 "unknown option --vplz" render "$cornell" --vplz 3
 refuses 2 "unknown option -size" render "$cornell" -size 64x36
 refuses 2 "--vpls: its value is missing" render "$cornell" --vpls
@@ -84,6 +112,8 @@ refuses 1 "--vpls" render "$cornell" --vpls 5000000
 refuses 1 "--interleave" render "$cornell" --interleave 3
 refuses 1 "--fov" render "$cornell" --fov 180
 refuses 1 "--sun" render "$cornell" --sun 0,0,0,1000
+refuses 1 "--map-range: expected a number above 0" compare a.exr b.exr --map-range 0
+refuses 1 "--exposure" compare a.exr b.exr --exposure 65
 refuses 1 "same point" render "$cornell" --eye 1,1,1 --target 1,1,1
 
 echo "files"
@@ -102,6 +132,21 @@ refuses 1 "missing/a.dot" render "$cornell" --dump-graph missing/a.dot
 mkdir "$work/folder.png"
 refuses 1 "folder.png" render "$cornell" -o "$work/folder.png"
 refuses 1 "/dev/full" render "$cornell" --stats /dev/full
+
+echo "pictures that cannot be compared"
+exr "$work/grey.exr" '\0\0\200\77' '\0\0\200\77'
+exr "$work/nan.exr" '\0\0\200\77' '\0\0\300\177'
+exr "$work/infinite.exr" '\0\0\200\377' '\0\0\200\77'
+head -c 300 "$work/grey.exr" >"$work/cut.exr"
+run compare "$work/grey.exr" "$work/grey.exr" || fail "compare with itself: $(cat "$work/stderr")"
+refuses 1 "no-such.exr" compare no-such.exr "$work/grey.exr"
+refuses 1 "no-such.exr" compare "$work/grey.exr" "$work/grey.exr" no-such.exr
+refuses 1 "not an OpenEXR file" compare "$work/grey.exr" "$cornell"
+refuses 1 "cut.exr" compare "$work/grey.exr" "$work/cut.exr"
+refuses 1 "$work/nan.exr: expected finite values, pixel 1,0 is nan" compare "$work/grey.exr" "$work/nan.exr" --map a.png
+refuses 1 "$work/infinite.exr: expected finite values, pixel 0,0 is -inf" compare "$work/infinite.exr" "$work/grey.exr"
+refuses 1 "no folder \"missing\"" compare "$work/grey.exr" "$work/nan.exr" --map missing/a.png
+refuses 1 "folder.png" compare "$work/grey.exr" "$work/grey.exr" --map "$work/folder.png"
 
 echo "scenes that lack something"
 refuses 1 "attic" render "$cornell" --camera attic
@@ -124,7 +169,7 @@ else
 fi
 
 echo "help"
-for arguments in --help -h "render --help" "render -h" "info --help" "devices --help" --version; do
+for arguments in --help -h "render --help" "render -h" "compare --help" "compare a.exr -h" "info --help" "devices --help" --version; do
   # shellcheck disable=SC2086
   run $arguments || fail "lanternfield $arguments: exit code $?"
   { [ -s "$work/stdout" ] && [ ! -s "$work/stderr" ]; } || fail "lanternfield $arguments: prints to the wrong stream"
@@ -138,6 +183,12 @@ done
 for default in "default 1280x720" "default 100000" "default 3" "default 1" "default auto" "default AB" "default vpl" \
   "default restrict" "default ordered" "default exact" "default importance" "default 0.01" "default 8"; do
   grep -qF "($default)" "$work/stdout" || fail "render --help has no \"$default\""
+done
+
+run compare --help
+for option in --json --map --map-kind --map-range --exposure relative_l2 relative_mse energy psnr flip_mean flip_p95 \
+  flip_p99 hdr_flip_mean hdr_flip_p95 hdr_flip_p99; do
+  grep -q -- "^  $option " "$work/stdout" || fail "compare --help has no $option"
 done
 
 echo "info and devices"
@@ -158,6 +209,46 @@ for file in a.png a.exr "${aovs[@]/%/.exr}"; do
 done
 [ "$(head -c 4 1/a.png | tail -c 3)" = PNG ] || fail "a.png is no PNG"
 rm -rf 1 2
+
+echo "comparison"
+# compares ARGUMENT...: succeeds.
+compares() {
+  run compare "$@" || fail "lanternfield compare $*: exit code $?: $(cat "$work/stderr")"
+}
+renders "$cornell" "${small[@]}" -o reference.exr
+renders "$cornell" "${small[@]}" --alpha 2 --seed 7 -o other.exr
+renders "$cornell" --size 32x36 --vpls 0 --frames 1 -o narrow.exr
+run compare reference.exr narrow.exr --map a.png && fail "pictures of two sizes are compared"
+grep -q "narrow.exr is 32x36, expected the 64x36 of the reference reference.exr" "$work/stderr" || fail "two sizes: $(cat "$work/stderr")"
+[ ! -e a.png ] || fail "a map of what cannot be compared"
+compares reference.exr reference.exr other.exr
+[ "$(wc -l <"$work/stdout")" = 4 ] || fail "compare does not print four lines: $(cat "$work/stdout")"
+[ "$(awk '{ print NF }' <<<"$(tail -n 2 "$work/stdout")" | sort -u)" = 11 ] || fail "not ten measures: $(cat "$work/stdout")"
+[ "$(awk '{ print length }' <<<"$(tail -n 3 "$work/stdout")" | sort -u | wc -l)" = 1 ] || fail "the table is not aligned"
+grep -qE "^reference.exr +0 +0 +1 +inf( +0){6}$" "$work/stdout" || fail "equal pictures: $(cat "$work/stdout")"
+compares other.exr reference.exr --json --exposure -2.5
+grep -q '"exposure":	-2.5' "$work/stdout" || fail "--exposure is not used: $(cat "$work/stdout")"
+for key in relative_l2 relative_mse psnr energy flip_mean flip_p95 flip_p99 hdr_flip_mean hdr_flip_p95 hdr_flip_p99; do
+  grep -qE "\"$key\":	[0-9.e-]*[1-9]" "$work/stdout" || fail "--json has no $key: $(cat "$work/stdout")"
+done
+compares reference.exr reference.exr --json
+grep -q '"psnr":	null' "$work/stdout" || fail "infinity is not null in JSON: $(cat "$work/stdout")"
+for n in 1 2; do
+  mkdir $n
+  compares reference.exr other.exr --map $n/difference.png
+  compares reference.exr other.exr --map=$n/wide.png --map-range 100
+  compares reference.exr other.exr reference.exr --map $n/flip.png --map-kind flip
+  cp "$work/stdout" $n/text
+done
+for file in difference.png wide.png flip-1.png flip-2.png text; do
+  { [ -s "1/$file" ] && cmp "1/$file" "2/$file"; } || fail "compare: $file differs between two runs"
+done
+[ "$(ls 1 | wc -l)" = 5 ] || fail "compare wrote $(ls 1)"
+for file in wide.png flip-1.png flip-2.png; do
+  cmp -s 1/difference.png 1/$file && fail "the difference map is $file"
+done
+cmp -s 1/flip-1.png 1/flip-2.png && fail "the maps of two images are equal"
+rm -rf ./*
 
 echo "statistics and the graph"
 renders "$cornell" "${small[@]}" --interleave 2 --stats a.json --dump-graph a.dot

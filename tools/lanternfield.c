@@ -1,5 +1,5 @@
 // The `lanternfield` command: reads its first word and hands over.
-#include "lanternfield.h"
+#include "lanternfield_bench.h"
 
 #include <string.h>
 
@@ -8,9 +8,10 @@ static const char help[] =
     "\n"
     "usage:\n"
     "  lanternfield render SCENE [OPTION...]   render a picture; by default out.png, 1280x720, 100000 virtual lights\n"
+    "  lanternfield compare REF IMG...         error measures of pictures against a reference, and error maps\n"
     "  lanternfield info SCENE                 triangles, materials, lights, animations, cameras, bounds, warnings\n"
     "  lanternfield devices                    Vulkan devices, and for each what it lacks\n"
-    "  lanternfield render --help              all options with units and defaults\n"
+    "  lanternfield COMMAND --help             all options of render or compare, with units and defaults\n"
     "  lanternfield --version\n"
     "\n"
     "SCENE is a .gltf or .glb file. Units are glTF's: metres, candela, lux, nits; angles are in degrees.\n"
@@ -72,7 +73,13 @@ int main(int argc, char **argv)
     static const struct {
         const char *name;
         int (*run)(int argc, char **argv); // the words behind the name
-    } commands[] = {{"render", render_command}, {"info", info_command}, {"devices", devices_command}};
+        bool has_help; // of its own
+    } commands[] = {
+        {"render", render_command, true},
+        {"compare", compare_command, true},
+        {"info", info_command, false},
+        {"devices", devices_command, false},
+    };
 
     if (argc < 2) {
         return wrong_usage("a command is missing", "");
@@ -89,8 +96,7 @@ int main(int argc, char **argv)
         if (strcmp(argv[1], commands[i].name) != 0) {
             continue;
         }
-        // render has a help of its own.
-        if (argc > 2 && is_help(argv[2]) && commands[i].run != render_command) {
+        if (argc > 2 && is_help(argv[2]) && !commands[i].has_help) {
             fputs(help, stdout);
             return EXIT_DONE;
         }

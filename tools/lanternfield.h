@@ -42,6 +42,7 @@ bool path_has_extension(const char *path, const char *extension); // ".png", wit
 
 // ---- The rendering: lanternfield_render.c.
 int render_run(const render_request *request); // returns the exit code
+bool output_path_check(const char *path); // before any work: false, and logged, when the file cannot be written
 
 // A scene on a device, seen as a request asks (scene, camera, eye, target, fov, sun, device, validate; its settings).
 typedef struct render_session {

@@ -22,7 +22,7 @@ typedef struct render_state {
 
 // ---- Before any work: can the files be written at all?
 
-static bool output_path_check(const char *path)
+bool output_path_check(const char *path)
 {
     struct stat status;
     if (stat(path, &status) == 0 && !S_ISREG(status.st_mode)) {
