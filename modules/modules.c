@@ -16,6 +16,7 @@ bool modules_init(renderer *r)
         interleave_init, // gathers interleaved tiles
         svgf_init, // filters the shadowed and unshadowed estimates alike
         taa_init, // steadies their ratio over time
+        progressive_init, // sums of the reference methods over the frames, and the picture made from them
         vpl_reference_init, // reference: every VPL at every pixel, and instant radiosity
         path_trace_init, // reference: path tracing
         composite_init, // emission + albedo * (direct + indirect * ratio)

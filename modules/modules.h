@@ -16,6 +16,7 @@ bool shadow_init(renderer *r);
 bool interleave_init(renderer *r);
 bool svgf_init(renderer *r);
 bool taa_init(renderer *r);
+bool progressive_init(renderer *r);
 bool vpl_reference_init(renderer *r);
 bool path_trace_init(renderer *r);
 bool composite_init(renderer *r);

@@ -72,7 +72,7 @@ static void query_execute(const frame_graph_context *context, void *user)
     const rays_pass *pass = user;
     frame_graph_bind(context, pass->pipeline);
     gpu_push(context->commands, &pass->count, sizeof pass->count);
-    gpu_dispatch(context->commands, div_up_u32(pass->count, 64), 1, 1);
+    gpu_dispatch(context->commands, div_up_u32(pass->count, 128), 1, 1); // 64 would be one group too many for RAYS_BATCH
 }
 
 void rays_trace(renderer *r, const char *batch, rays_kind kind, uint32_t count)

@@ -113,7 +113,7 @@ static void constants_extract(ecs_world *world, void *user)
     frame_constants *c = &r->constants;
     const frame_constants last = *c;
     camera_constants(r);
-    previous_constants(c, r->frame == 0 ? c : &last);
+    previous_constants(c, last.width == 0 ? c : &last); // a loaded state's first frame has no last one
     c->width = r->settings.width;
     c->height = r->settings.height;
     c->frame = r->frame;

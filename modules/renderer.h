@@ -12,7 +12,7 @@
 // white Lambertian surface would send out, in nits, so that radiance = albedo * light):
 //
 //   tlas               acceleration  the scene                                         acceleration
-//   vpls               vpl[vpls]                                                       vpl_trace
+//   vpls               vpl[vpls]                                     vpl_trace; vpl_reference where it keeps them
 //   lgh_header         lgh_header                                                      lgh_build
 //   lgh_lights         grid_light[]  merged, top level first                           lgh_build
 //   lgh_sums           lgh_sums[]    the same order; with lgh_masks, lgh_ranks, lgh_vertices: see shaders/lgh.glsl.h

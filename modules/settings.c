@@ -358,7 +358,7 @@ static const setting_info table[] = {
      .min = 1,
      .max = 1000000,
      .value_name = "N",
-     .help = "frames rendered so that temporal history settles, 1 to 1000000; the last is written"},
+     .help = "lgh: frames rendered so that temporal history settles, 1 to 1000000; the last is written"},
     {.name = "spp",
      .type = SETTING_UINT,
      FIELD(spp),

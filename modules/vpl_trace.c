@@ -1,5 +1,6 @@
 // Virtual point lights by ray query: makes `vpls`, and counts the rays in `rays_vpl`.
 #include "modules.h"
+#include "vpl_reference.h"
 
 #include "lanternfield_renderer_shaders.h"
 
@@ -22,7 +23,7 @@ static void vpl_trace_execute(const frame_graph_context *context, void *user)
 
 static void vpl_trace_setup(renderer *r, void *state)
 {
-    if (!renderer_has_vpls(r))
+    if (!renderer_has_vpls(r) || vpl_reference_has_vpls(r))
         return;
     vpl_trace *pass = state;
     const render_settings *s = &r->settings;

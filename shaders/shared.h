@@ -146,6 +146,26 @@ SHARED_STRUCT(ray_hit) {
     SHARED_VEC2(barycentrics); // weights of its second and third corner
 } SHARED_END(ray_hit, 20)
 
+// ---- Path tracing
+
+SHARED_STRUCT(path_state) {
+    SHARED_VEC3(throughput); // product of the albedos so far, without the first vertex's
+    SHARED_VEC3(light);      // gathered so far at the first vertex, radiance over albedo, nits
+} SHARED_END(path_state, 24)
+
+// What a vertex of a path does
+#define PATH_GATHER 1u   // direct light at it counts
+#define PATH_EMISSION 2u // emission that the ray towards it met counts
+#define PATH_NEXT 4u     // a ray leaves it
+SHARED_STRUCT(path_step) {
+    uint pixels;       // of the picture
+    uint count;        // paths of this frame: index = layer * pixels + pixel
+    uint first_sample; // of this frame: sample = first_sample + layer
+    uint vertex;       // 0 is what the pixel sees
+    uint flags;        // PATH_*
+    float light_power; // of all light sources, as their distribution has it
+} SHARED_END(path_step, 24)
+
 // ---- Virtual point lights
 
 SHARED_STRUCT(vpl) {

@@ -45,6 +45,8 @@ TEST(defaults_are_the_documented_ones)
     CHECK(settings.start_level == 1 && !settings.sample_s1 && settings.filter && settings.taa);
     CHECK_NEAR(settings.singularity, 0.01, 1e-9);
     CHECK(settings.only == ONLY_ALL && settings.seed == 1 && settings.auto_exposure && settings.frames == 8);
+    CHECK(settings.method == METHOD_LGH && settings.rays == RAYS_AUTO);
+    CHECK(settings.spp == 64 && settings.until == 0 && settings.ir_vpls == 300);
 }
 
 TEST(every_default_reads_back_as_itself)
@@ -99,6 +101,37 @@ TEST(whole_numbers_keep_to_their_ranges)
           malformed("vpls", "1.5"));
     CHECK(malformed("vpls", "") && malformed("vpls", "ten"));
     CHECK_STRING(error.message, "--vpls: expected a whole number from 0 to 2500000, got \"ten\"");
+}
+
+TEST(the_references_have_limits_of_their_own)
+{
+    CHECK(set("spp", "1") && settings.spp == 1);
+    CHECK(set("spp", "16777216") && settings.spp == 1 << 24);
+    CHECK(set("ir-vpls", "65536") && settings.ir_vpls == 65536);
+    CHECK(set("until", "0.01") && settings.until == 0.01f);
+    CHECK(set("until", "0") && settings.until == 0);
+    CHECK(set("until", "1") && settings.until == 1);
+    CHECK(beyond("spp", "0") && beyond("spp", "16777217") && beyond("ir-vpls", "0") && beyond("ir-vpls", "65537"));
+    CHECK(beyond("until", "-0.01") && beyond("until", "1.5"));
+    CHECK(malformed("spp", "1e3") && malformed("ir-vpls", "many") && malformed("until", "1%"));
+    CHECK_STRING(error.message, "--until: expected a number of at least 0 and at most 1, got \"1%\"");
+    CHECK(malformed("method", "lgh,path") && malformed("method", "LGH"));
+    CHECK_STRING(error.message, "--method: expected one of lgh, path, vpl, ir, got \"LGH\"");
+    CHECK(malformed("rays", "cpu"));
+    CHECK_STRING(error.message, "--rays: expected one of auto, query, embree, got \"cpu\"");
+    CHECK(set("method", "ir") && settings.method == METHOD_IR && set("rays", "embree") &&
+          settings.rays == RAYS_EMBREE);
+}
+
+TEST(help_says_which_method_a_setting_belongs_to)
+{
+    static const struct {
+        const char *name, *method;
+    } settings_of[] = {{"spp", "path:"}, {"until", "path:"}, {"ir-vpls", "ir:"}, {"frames", "lgh"}};
+    for (size_t i = 0; i < countof(settings_of); i++) {
+        const char *const text = settings_find(settings_of[i].name)->help;
+        CHECK(strncmp(text, settings_of[i].method, strlen(settings_of[i].method)) == 0);
+    }
 }
 
 TEST(alpha_is_greater_than_0_and_at_most_16)
@@ -203,6 +236,8 @@ int main(void)
     RUN_FRESH(every_setting_has_a_help_line_and_its_own_name);
     RUN_FRESH(size_takes_two_sides_of_1_to_16384_pixels);
     RUN_FRESH(whole_numbers_keep_to_their_ranges);
+    RUN_FRESH(the_references_have_limits_of_their_own);
+    RUN_FRESH(help_says_which_method_a_setting_belongs_to);
     RUN_FRESH(alpha_is_greater_than_0_and_at_most_16);
     RUN_FRESH(singularity_is_a_fraction);
     RUN_FRESH(levels_and_exposure_can_be_automatic);

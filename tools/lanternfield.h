@@ -1,7 +1,7 @@
 // What the files of the `lanternfield` command share. The command is a thin user of modules/renderer.h.
 #pragma once
 
-#include "modules/renderer.h"
+#include "modules/progressive.h"
 
 #include <stdio.h>
 
@@ -31,6 +31,7 @@ typedef struct render_request { // strings belong to argv
     float fov; // degrees, vertical
     float sun[4]; // direction in which the light travels, lux
     const char *stats, *dump_graph, *device; // NULL: not asked for
+    const char *state; // file that keeps a progressive picture; NULL: none
     bool validate;
     bool help;
 } render_request;
@@ -52,9 +53,30 @@ typedef struct render_session {
 } render_session;
 bool render_session_open(render_session *session, const render_request *request); // false: logged; close it all the same
 void render_session_close(render_session *session);
-// Text that names all that a progressive picture depends on but its length: the scene's files by content hash, camera,
-// sun, size and settings. Equal text, equal picture. free() it.
+// Text that names all that a picture depends on: the scene by hashes of what was loaded, camera, sun, size, and those
+// settings that the method reads; for the progressive methods without what only says how long they go on. One line
+// "key value" each. Equal text, equal picture (or sums), but for rounding where another tracer is asked for. free() it.
+// lanternfield_identity.c.
 char *render_identity(const render_session *session, const render_request *request);
+
+// ---- Progressive methods, frame by frame, with their state in a file: lanternfield_progressive.c.
+typedef struct progressive_run { // zero-initialise
+    const char *state; // file, or NULL
+    char *identity;
+    double start, saved_at, save_seconds; // time_now(); what the last save took
+    uint64_t saved_done;
+    bool save_failed; // logged; no further save is tried
+    uint32_t spp; // that were asked for
+    progressive_status before, now; // before the first frame, after the last
+} progressive_run;
+// Before the first frame: goes on from the state file where there is one. False when it does not fit (logged).
+bool progressive_run_begin(progressive_run *run, const render_session *session, const render_request *request);
+// After each frame: sees how far the picture is, shows it, and saves the state from time to time.
+void progressive_run_step(progressive_run *run, renderer *r);
+// After the last frame: saves the state.
+void progressive_run_end(progressive_run *run, renderer *r);
+void progressive_run_fini(progressive_run *run);
+double progressive_run_rays(const progressive_run *run); // traced by this run
 
 // ---- Ctrl-C and SIGTERM: noted, so that what is running can finish and be written; a second one ends the process.
 void interrupt_watch(void);
@@ -70,6 +92,7 @@ const struct aov_info *aov_find(const char *name); // NULL when unknown
 void aov_names_print(char *text, size_t size); // "albedo, normal, ..."
 const char *aov_name(const struct aov_info *aov);
 bool aov_counts_lights(const struct aov_info *aov); // needs renderer.count_lights
+bool aov_is_made_by(const struct aov_info *aov, uint32_t method); // METHOD_*
 // Asks the renderer to keep what the picture is made from.
 void aov_export(renderer *r, const struct aov_info *aov);
 // False when this configuration does not make it. Call after a frame.
@@ -108,6 +131,8 @@ typedef struct render_summary {
     uint32_t frames; // rendered
     bool counting_is_timed; // the only frame also counted lights
     const render_times *times;
+    const progressive_run *progress; // NULL: the method is none of those
+    double seconds; // of all frames
 } render_summary;
 void stats_export(renderer *r); // asks the renderer to keep what the statistics are made from
 bool stats_write(renderer *r, const render_summary *summary, const char *path);

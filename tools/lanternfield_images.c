@@ -177,20 +177,21 @@ typedef struct aov_info {
     const char *image; // in the frame graph
     uint32_t channels; // of the file
     bool (*finish)(renderer *r, float_image *image); // NULL: written as it is
+    bool of_every_method; // false: of the lighting grid hierarchy's
 } aov_info;
 
 #define LIGHTS_PER_PIXEL "lights_per_pixel|-"
 
 static const aov_info aovs[] = {
-    {"albedo", "albedo", 3, NULL},
-    {"normal", "normals", 3, normals_finish},
-    {"depth", "depth", 1, depth_finish},
-    {"direct", "aov_direct", 3, NULL},
-    {"indirect", "aov_indirect", 3, NULL},
-    {"shadow-u", "shadow_u_filtered|shadow_u|-", 3, NULL},
-    {"shadow-s", "shadow_s_filtered|shadow_s|-", 3, NULL},
-    {"shadow-ratio", "shadow_ratio|-", 3, NULL},
-    {"lights-per-pixel", LIGHTS_PER_PIXEL, 1, untile_finish},
+    {"albedo", "albedo", 3, NULL, true},
+    {"normal", "normals", 3, normals_finish, true},
+    {"depth", "depth", 1, depth_finish, true},
+    {"direct", "aov_direct", 3, NULL, false},
+    {"indirect", "aov_indirect", 3, NULL, false},
+    {"shadow-u", "shadow_u_filtered|shadow_u|-", 3, NULL, false},
+    {"shadow-s", "shadow_s_filtered|shadow_s|-", 3, NULL, false},
+    {"shadow-ratio", "shadow_ratio|-", 3, NULL, false},
+    {"lights-per-pixel", LIGHTS_PER_PIXEL, 1, untile_finish, false},
 };
 
 const aov_info *aov_find(const char *name)
@@ -220,6 +221,11 @@ const char *aov_name(const aov_info *aov)
 bool aov_counts_lights(const aov_info *aov)
 {
     return aov->finish == untile_finish;
+}
+
+bool aov_is_made_by(const aov_info *aov, uint32_t method)
+{
+    return method == METHOD_LGH || aov->of_every_method;
 }
 
 void export_add(renderer *r, const char *name)
@@ -288,7 +294,7 @@ static bool display_write(renderer *r, const char *path)
 
 bool picture_write(renderer *r, const char *path)
 {
-    static const aov_info radiance = {"radiance", "radiance", 3, NULL};
+    static const aov_info radiance = {"radiance", "radiance", 3, NULL, true};
     return path_has_extension(path, ".exr") ? aov_write(r, &radiance, path) : display_write(r, path);
 }
 

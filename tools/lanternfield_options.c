@@ -123,6 +123,13 @@ static bool stats_read(render_request *request, const char *value, setting_error
     return true;
 }
 
+static bool state_read(render_request *request, const char *value, setting_error *error)
+{
+    (void)error;
+    request->state = value;
+    return true;
+}
+
 static bool dump_graph_read(render_request *request, const char *value, setting_error *error)
 {
     (void)error;
@@ -148,6 +155,8 @@ static const command_option output_options[] = {
     {"o", "FILE", "write FILE: .png is tone-mapped sRGB, .exr linear radiance in nits; repeatable (default out.png)",
      output_read},
     {"aov", "NAME=FILE.exr", "also write one part of the picture; repeatable; the names are below", aov_read},
+    {"state", "FILE", "path, vpl: go on from FILE where there is one, and keep it up to date (default: none)",
+     state_read},
     {"stats", "FILE.json", "write times in ms, rays, lights and flux (default: none)", stats_read},
     {"dump-graph", "FILE.dot", "write the frame graph for graphviz, or as text to FILE.txt (default: none)",
      dump_graph_read},
@@ -251,6 +260,11 @@ void render_help_print(FILE *out)
             "\nParts of the picture (--aov): %s\n"
             "  depth is in metres along the view, 0 where nothing is; direct and indirect (unshadowed) are in nits;\n"
             "  normal is in world space; shadow-u, shadow-s and shadow-ratio are the estimates behind the shadows.\n"
+            "  Methods other than lgh make albedo, normal and depth only.\n"
+            "\nThe references (--method path, vpl) get better until they have all their samples or VPLs, or are as\n"
+            "good as --until asks, and take as many frames as that needs. With --state FILE they go on where they\n"
+            "were stopped, killed or finished; FILE is saved every few seconds. Settings that a method does not\n"
+            "read change nothing.\n"
             "\nCtrl-C writes what there is. Exit codes: 0 done, 1 failed (also a value that cannot be used),\n"
             "2 wrong usage, 130 interrupted.\n",
             names);
@@ -314,6 +328,36 @@ static int option_read(int argc, char **argv, int *i, render_request *request)
     return error.out_of_range ? EXIT_FAILED : EXIT_WRONG_USAGE;
 }
 
+// Whether the method can do what is asked for. Settings that it does not read are let pass, so that methods can be
+// compared by changing one word; what the user would wait for in vain is not.
+static bool request_fits_method(const render_request *request)
+{
+    const render_settings *const settings = &request->settings;
+    char method[32], only[32];
+    settings_get(settings, settings_find("method"), method);
+    settings_get(settings, settings_find("only"), only);
+    if (request->state && settings->method != METHOD_PATH && settings->method != METHOD_VPL) {
+        log_error("--state: --method %s has no state to keep, only path and vpl have", method);
+        return false;
+    }
+    if (settings->until > 0 && settings->method != METHOD_PATH) {
+        log_error("--until: --method %s does not estimate its error, only path does", method);
+        return false;
+    }
+    if (settings->only == ONLY_INDIRECT_UNSHADOWED && settings->method == METHOD_PATH) {
+        log_error("--only %s: --method %s has no unshadowed light", only, method);
+        return false;
+    }
+    for (uint32_t i = 0; i < request->aov_count; i++) {
+        const struct aov_info *const aov = request->aovs[i].aov;
+        if (!aov_is_made_by(aov, settings->method)) {
+            log_error("--aov %s: --method %s does not make it", aov_name(aov), method);
+            return false;
+        }
+    }
+    return true;
+}
+
 int render_options_read(int argc, char **argv, render_request *request)
 {
     *request = (render_request){.settings = render_settings_default()};
@@ -342,5 +386,5 @@ int render_options_read(int argc, char **argv, render_request *request)
     if (request->output_count == 0) {
         request->outputs[request->output_count++] = "out.png";
     }
-    return EXIT_DONE;
+    return request_fits_method(request) ? EXIT_DONE : EXIT_FAILED;
 }

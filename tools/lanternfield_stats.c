@@ -158,12 +158,14 @@ static void settings_to_json(cJSON *root, const render_settings *settings)
     }
 }
 
-// Rays of the last frame; a pass that did not run has no counter.
-static void rays_to_json(cJSON *root, renderer *r)
+// Rays of the last frame; a pass that did not run has no counter. Rays per pixel are those that the picture took: of
+// the last frame, or of all frames of a progressive method.
+static void rays_to_json(cJSON *root, renderer *r, const progressive_run *progress)
 {
     static const struct {
         const char *name, *buffer;
-    } counters[] = {{"vpl", "rays_vpl|-"}, {"direct", "rays_direct|-"}, {"shadow", "rays_shadow|-"}};
+    } counters[] = {
+        {"vpl", "rays_vpl|-"}, {"direct", "rays_direct|-"}, {"shadow", "rays_shadow|-"}, {"path", "rays_path|-"}};
     cJSON *const object = cJSON_AddObjectToObject(root, "rays");
     double sum = 0;
     for (size_t i = 0; i < countof(counters); i++) {
@@ -175,6 +177,7 @@ static void rays_to_json(cJSON *root, renderer *r)
         cJSON_AddNumberToObject(object, counters[i].name, rays);
         sum += rays;
     }
+    sum = progress ? progressive_run_rays(progress) : sum;
     cJSON_AddNumberToObject(root, "rays_per_pixel", sum / ((double)r->settings.width * r->settings.height));
 }
 
@@ -203,7 +206,7 @@ static void color_add(double sum[3], const float color[3])
 
 static void vpls_to_json(cJSON *root, cJSON *flux, renderer *r)
 {
-    const uint32_t slots = r->settings.vpls;
+    const uint32_t slots = renderer_vpl_slots(r);
     vpl *const vpls = buffer_items_read(r, "vpls|-", slots, sizeof(vpl));
     uint32_t occupied = 0;
     double sum[3] = {0};
@@ -255,12 +258,34 @@ static void lights_per_pixel_to_json(cJSON *root, renderer *r)
 void stats_export(renderer *r)
 {
     static const char *const names[] = {
-        "vpls|-",        "lgh_header|-",  "lgh_lights|-",       "rays_vpl|-",
-        "rays_direct|-", "rays_shadow|-", "lights_per_pixel|-", "depth",
+        "vpls|-",        "lgh_header|-", "lgh_lights|-",       "rays_vpl|-", "rays_direct|-",
+        "rays_shadow|-", "rays_path|-",  "lights_per_pixel|-", "depth",
     };
     for (size_t i = 0; i < countof(names); i++) {
         export_add(r, names[i]);
     }
+}
+
+static void progress_to_json(cJSON *root, const render_settings *settings, const render_summary *summary)
+{
+    const progressive_status *const status = &summary->progress->now;
+    const double rays = progressive_run_rays(summary->progress);
+    char method[32];
+    settings_get(settings, settings_find("method"), method);
+    cJSON *const object = cJSON_AddObjectToObject(root, "progress");
+    cJSON_AddStringToObject(object, "method", method);
+    cJSON_AddNumberToObject(object, "done", (double)status->done);
+    cJSON_AddNumberToObject(object, "done_before", (double)summary->progress->before.done); // in the state file
+    cJSON_AddNumberToObject(object, "total", (double)status->total);
+    cJSON_AddBoolToObject(object, "finished", status->finished);
+    if (isnan(status->error)) {
+        cJSON_AddNullToObject(object, "estimated_error");
+    } else {
+        cJSON_AddNumberToObject(object, "estimated_error", status->error);
+    }
+    cJSON_AddNumberToObject(object, "rays", rays); // by this run
+    cJSON_AddNumberToObject(object, "seconds", summary->seconds);
+    cJSON_AddNumberToObject(object, "mrays_per_second", 1e-6 * rays / summary->seconds);
 }
 
 static cJSON *stats_to_json(renderer *r, const render_summary *summary)
@@ -277,12 +302,15 @@ static cJSON *stats_to_json(renderer *r, const render_summary *summary)
     }
     percentile_to_json(root, "frame_ms_p50", &summary->times->frames, 0.5);
     percentile_to_json(root, "frame_ms_p95", &summary->times->frames, 0.95);
+    if (summary->progress) {
+        progress_to_json(root, &r->settings, summary);
+    }
     passes_to_json(root, summary->times);
     cJSON *const flux = cJSON_CreateObject();
     vpls_to_json(root, flux, r);
     levels_to_json(root, flux, r);
     lights_per_pixel_to_json(root, r);
-    rays_to_json(root, r);
+    rays_to_json(root, r, summary->progress);
     cJSON_AddItemToObject(root, "flux", flux);
     cJSON_AddNumberToObject(root, "gpu_memory_peak_bytes", (double)gpu_memory_peak(r->gpu));
     cJSON_AddNumberToObject(root, "validation_messages", gpu_validation_messages(r->gpu));
