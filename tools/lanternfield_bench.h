@@ -37,6 +37,9 @@ typedef struct bench_reference { // errors are measured against each
     double budget_s; // rendering stops after this long; 0: when the method is finished
 } bench_reference;
 
+// A series keeps its colour and marker over all charts of a suite; where several views share a panel, marker and dashes
+// tell the view. Points whose configurations have no label show the settings in which their series differs, as "2/10K",
+// and a line below the chart says which these are.
 typedef struct bench_chart {
     const char *name, *title; // name: of the files NAME.svg and NAME.png
     const char *x, *y; // columns of results.csv, or a metric (see bench_metric); bars do without x, and
@@ -159,6 +162,11 @@ typedef struct bench_results {
 double bench_metric(const bench_results *results, const bench_row *row, const char *name);
 bool bench_metric_known(const bench_suite *suite, const char *name); // for checking suites
 const bench_row *bench_row_find(const bench_results *results, const bench_view *view, const char *configuration);
+
+// A metric as heading, with its unit ("frame, ms"), and a number to three digits ("1,230", "0.0123"; whole numbers in
+// full, NAN as a dash). Both live in `memory`. In lanternfield_bench_report.c.
+const char *bench_metric_title(arena *memory, const char *name);
+const char *bench_number(arena *memory, double value);
 
 // ---- What is made of results: results.csv, charts as SVG and PNG, report.html, report.md (the tables and comparisons
 // alone, for docs/). All written beside and renamed. Rows that are not done are left out and named.
