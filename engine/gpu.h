@@ -93,7 +93,11 @@ gpu_memory gpu_memory_create(gpu *gpu, const VkMemoryRequirements *requirements)
 void gpu_memory_destroy(gpu *gpu, gpu_memory memory);
 
 VkDeviceSize gpu_memory_used(const gpu *gpu); // bytes allocated now
-VkDeviceSize gpu_memory_peak(const gpu *gpu);
+VkDeviceSize gpu_memory_peak(const gpu *gpu); // the most that was allocated at once, since creation or the last reset
+// The peak starts anew from what is allocated now. Counted is device memory that this layer allocates: resources,
+// acceleration structures, staging buffers; what waits for its destruction too. Not counted: what the driver and
+// libraries on the host (Embree) take for themselves.
+void gpu_memory_peak_reset(gpu *gpu);
 
 // ---- The bindless set (set 1): what every shader may read of the scene. One per gpu; arrays grow by index.
 // Its layout is fixed by `shaders/scene.glsl.h`: storage buffers at bindings 0..GPU_SCENE_BUFFERS-1, then the sampled

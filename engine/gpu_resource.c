@@ -181,6 +181,10 @@ VkDeviceSize gpu_memory_peak(const gpu *gpu)
 {
     return gpu->memory_peak;
 }
+void gpu_memory_peak_reset(gpu *gpu)
+{
+    gpu->memory_peak = gpu->memory_used;
+}
 
 // The memory that a resource placed at `offset` of `memory` binds to, or its own, allocated here.
 static VkDeviceMemory memory_place(gpu *gpu, gpu_memory memory, VkDeviceSize offset, gpu_owned *owned,

@@ -17,7 +17,8 @@ typedef struct image_measures {
 // infinite.
 //
 // `ev`: exposure of the tone-mapped measures, L * 2^ev through the renderer's own tone curve; NAN: the reference's
-// log-average at 0.18, as the renderer does by itself. `maps` may be NULL, else takes width * height values each.
+// log-average at 0.18, as the renderer does by itself. `maps` may be NULL, else takes width * height values each;
+// `measures` may be NULL where the maps alone are wanted.
 // False, and one logged line, when a value is not finite.
 typedef struct image_maps {
     float *flip; // LDR-FLIP per pixel, 0 to 1

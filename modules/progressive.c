@@ -412,9 +412,15 @@ void progressive_end(renderer *r, uint64_t count, const float factors[2], bool h
 
 // ---- Life
 
-static void progressive_setup(renderer *r, void *state)
+// Only the methods add passes. One that needs no sums gives their memory back.
+static void progressive_setup(renderer *r, void *user)
 {
-    (void)r, (void)state; // only the methods add passes
+    progressive *state = user;
+    if (r->settings.method != METHOD_LGH || !state->sums.id)
+        return;
+    restart(state);
+    gpu_buffer_destroy(r->gpu, state->sums);
+    state->sums = (gpu_buffer){0};
 }
 
 static void progressive_fini(renderer *r, void *user)

@@ -282,6 +282,11 @@ static void slice_declare(renderer *r, vpl_reference *state, const slice *s)
 static void vpl_reference_setup(renderer *r, void *user)
 {
     vpl_reference *state = user;
+    if (r->settings.method != METHOD_VPL && state->vpls.id) {
+        gpu_buffer_destroy(r->gpu, state->vpls);
+        state->vpls = (gpu_buffer){0};
+        state->kept = false;
+    }
     if (r->settings.method != METHOD_VPL && !is_instant(r))
         return;
     if (!size_is_possible(r)) {

@@ -180,6 +180,8 @@ TEST(memory_is_counted_and_given_back)
     gpu_buffer_destroy(device, buffer);
     CHECK(gpu_memory_used(device) == before);
     CHECK(gpu_memory_peak(device) >= before + (1 << 20));
+    gpu_memory_peak_reset(device);
+    CHECK(gpu_memory_peak(device) == before);
 }
 
 TEST(destroyed_buffer_lives_until_its_commands_have_finished)

@@ -9,9 +9,10 @@ static const char help[] =
     "usage:\n"
     "  lanternfield render SCENE [OPTION...]   render a picture; by default out.png, 1280x720, 100000 virtual lights\n"
     "  lanternfield compare REF IMG...         error measures of pictures against a reference, and error maps\n"
+    "  lanternfield bench SUITE.json -o DIR    measure a suite of configurations: CSV, charts, report; can be resumed\n"
     "  lanternfield info SCENE                 triangles, materials, lights, animations, cameras, bounds, warnings\n"
     "  lanternfield devices                    Vulkan devices, and for each what it lacks\n"
-    "  lanternfield COMMAND --help             all options of render or compare, with units and defaults\n"
+    "  lanternfield COMMAND --help             all options of render, compare or bench, with units and defaults\n"
     "  lanternfield --version\n"
     "\n"
     "SCENE is a .gltf or .glb file. Units are glTF's: metres, candela, lux, nits; angles are in degrees.\n"
@@ -77,6 +78,7 @@ int main(int argc, char **argv)
     } commands[] = {
         {"render", render_command, true},
         {"compare", compare_command, true},
+        {"bench", bench_command, true},
         {"info", info_command, false},
         {"devices", devices_command, false},
     };
