@@ -60,7 +60,7 @@ enum {
     TITLE_HEIGHT = 40,
     PANEL_TITLE_HEIGHT = 26,
     LEFT_MARGIN = 72, // of a panel: ticks and axis label
-    BOTTOM_MARGIN = 54,
+    BOTTOM_MARGIN = 60,
     RIGHT_MARGIN = 18,
     FOOTNOTE_HEIGHT = 16,
     KEY_SAMPLE = 62, // width of a line or marker in the legend, with what is around it
