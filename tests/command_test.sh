@@ -38,6 +38,18 @@ renders() {
   run render "$@" || fail "lanternfield render $*: exit code $?: $(cat "$work/stderr")"
 }
 
+# background ARGUMENT...: starts a rendering and waits until its frames begin; its id is $process.
+background() {
+  "$lanternfield" render "$@" >"$work/stdout" 2>"$work/stderr" &
+  process=$!
+  # Until the program, not the shell that it is started from, catches SIGINT (bit 1 of its mask), as its frames begin.
+  until [[ $(cat /proc/$process/comm 2>/dev/null) = lanternfield &&
+    $(sed -n 's/^SigCgt:\s*//p' /proc/$process/status 2>/dev/null) =~ [2367abef]$ ]]; do
+    kill -0 $process 2>/dev/null || break
+    sleep 0.1
+  done
+}
+
 cornell=$scenes/cornell.glb
 small=(--size 64x36 --vpls 1000 --frames 2)
 
@@ -282,14 +294,7 @@ cmp -s dark.exr sun.exr && fail "--sun makes no light"
 rm -f ./*
 
 echo "Ctrl-C writes what there is"
-"$lanternfield" render "$cornell" --size 64x36 --vpls 1000 --frames 1000000 -o a.png --aov lights-per-pixel=b.exr \
-  >"$work/stdout" 2>"$work/stderr" &
-process=$!
-# Wait until the process catches SIGINT (bit 1 of its mask), which it does when its frames begin.
-until [[ $(sed -n 's/^SigCgt:\s*//p' /proc/$process/status 2>/dev/null) =~ [2367abef]$ ]]; do
-  kill -0 $process 2>/dev/null || break
-  sleep 0.1
-done
+background "$cornell" --size 64x36 --vpls 1000 --frames 1000000 -o a.png --aov lights-per-pixel=b.exr
 sleep 0.5
 kill -INT $process
 wait $process
@@ -307,17 +312,6 @@ two_rooms=$scenes/two_rooms.glb
 
 # number KEY FILE: a number of the statistics, the last of that name
 number() { sed -n "s/^\t*\"$1\":\t\([0-9.e+-]*\),\{0,1\}$/\1/p" "$2" | tail -n 1; }
-
-# background ARGUMENT...: starts a rendering and waits until its frames begin; its id is $process.
-background() {
-  "$lanternfield" render "$@" >"$work/stdout" 2>"$work/stderr" &
-  process=$!
-  # SIGINT is bit 1 of the mask of caught signals.
-  until [[ $(sed -n 's/^SigCgt:\s*//p' /proc/$process/status 2>/dev/null) =~ [2367abef]$ ]]; do
-    kill -0 $process 2>/dev/null || break
-    sleep 0.1
-  done
-}
 
 echo "options that do not fit the method are refused before any work"
 refuses 1 "--state: --method lgh" render no-such.glb --state a.state
