@@ -87,7 +87,8 @@ static int options_read(bench_options *options, int argc, char **argv)
     return options->help || options->folder ? EXIT_DONE : wrong_usage("bench needs -o DIR", "");
 }
 
-bool bench_view_selected(const char *list, const char *name)
+// Whether a name is in "a,b,c"; all are when the list is NULL.
+static bool list_names(const char *list, const char *name)
 {
     const size_t length = strlen(name);
     for (const char *item = list; item; item = strchr(item, ',') ? strchr(item, ',') + 1 : NULL) {
@@ -98,6 +99,11 @@ bool bench_view_selected(const char *list, const char *name)
     return !list;
 }
 
+bool bench_view_selected(const bench_run *run, const bench_view *view)
+{
+    return !view->absent && list_names(run->options.views, view->name);
+}
+
 const char *bench_path(bench_run *run, const char *name)
 {
     return arena_printf(&run->memory, "%s/%s", run->options.folder, name);
@@ -105,22 +111,30 @@ const char *bench_path(bench_run *run, const char *name)
 
 // ---- Before any work: are the views there, and their scenes?
 
-static bool views_check(const bench_run *run)
+static bool views_check(bench_run *run)
 {
-    uint32_t selected = 0;
+    uint32_t named = 0, selected = 0;
     for (uint32_t v = 0; v < run->suite->view_count; v++) {
-        const bench_view *const view = &run->suite->views[v];
-        if (!bench_view_selected(run->options.views, view->name)) {
+        bench_view *const view = &run->suite->views[v];
+        if (!list_names(run->options.views, view->name)) {
             continue;
         }
-        selected++;
-        if (!run->options.report_only && access(view->scene, R_OK) != 0) {
+        named++;
+        const bool is_missing = !run->options.report_only && access(view->scene, R_OK) != 0;
+        if (is_missing && !view->optional) {
             log_error("%s: views[%u].scene: there is no readable file \"%s\"", run->suite->path, v, view->scene);
             return false;
         }
+        view->absent = is_missing;
+        selected += !view->absent;
+        if (is_missing) {
+            log_warning("%s: view \"%s\" is left out: there is no file \"%s\"", run->suite->path, view->name, view->scene);
+        }
     }
-    if (selected == 0) {
+    if (named == 0) {
         log_error("--views: %s has no view of \"%s\"", run->suite->path, run->options.views);
+    } else if (selected == 0) {
+        log_error("%s: none of its scenes is there", run->suite->path);
     }
     return selected > 0;
 }
@@ -132,7 +146,7 @@ static int views_run(bench_run *run)
     int code = EXIT_DONE;
     for (uint32_t v = 0; code == EXIT_DONE && v < run->suite->view_count; v++) {
         run->view = &run->suite->views[v];
-        code = bench_view_selected(run->options.views, run->view->name) ? bench_view_run(run) : EXIT_DONE;
+        code = bench_view_selected(run, run->view) ? bench_view_run(run) : EXIT_DONE;
     }
     return code;
 }

@@ -11,6 +11,8 @@ typedef struct bench_view { // a scene seen by a camera
     const char *name; // "atrium"
     const char *scene; // path, relative to the folder that the command runs in
     const char *camera; // NULL: the first
+    bool optional; // left out, with a warning, where the scene's file is missing
+    bool absent; // so it is
     bool has_sun;
     float sun[4];
     render_settings settings; // the suite's with the view's own, before a configuration's

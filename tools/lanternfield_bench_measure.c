@@ -97,7 +97,7 @@ static double pending_seconds(const bench_run *run)
     // Views to come: taken to cost as much.
     for (uint32_t i = 0; i < run->results.row_count; i++) {
         const bench_row *const row = &run->results.rows[i];
-        if (row->view > run->view && bench_view_selected(run->options.views, row->view->name)) {
+        if (row->view > run->view && bench_view_selected(run, row->view)) {
             const double seconds = run->seconds[row->configuration - run->suite->configurations];
             all += run->suite->repeats * (seconds > 0 ? seconds : mean);
         }
@@ -113,7 +113,7 @@ static uint32_t pending_repeats(const bench_run *run)
     }
     for (uint32_t i = 0; i < run->results.row_count; i++) {
         const bench_row *const row = &run->results.rows[i];
-        const bool comes = row->view > run->view && bench_view_selected(run->options.views, row->view->name);
+        const bool comes = row->view > run->view && bench_view_selected(run, row->view);
         count += comes ? run->suite->repeats : 0;
     }
     return count;

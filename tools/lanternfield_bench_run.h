@@ -29,8 +29,8 @@ typedef struct bench_run {
     uint32_t done_repeats;
 } bench_run;
 
-// Whether a view's name is in "a,b,c"; all are when the list is NULL.
-bool bench_view_selected(const char *list, const char *name);
+// Whether a view is asked for (--views) and its scene is there.
+bool bench_view_selected(const bench_run *run, const bench_view *view);
 // A file of the -o folder.
 const char *bench_path(bench_run *run, const char *name);
 

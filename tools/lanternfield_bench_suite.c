@@ -382,7 +382,7 @@ static bool list_read(const reader *reader, const char *place, const cJSON *json
 static const key_info view_keys[] = {
     NEEDED("name", string_read, file_view, view.name),   NEEDED("scene", string_read, file_view, view.scene),
     KEY("camera", string_read, file_view, view.camera),  KEY("sun", sun_read, file_view, sun),
-    KEY("settings", settings_read, file_view, settings),
+    KEY("settings", settings_read, file_view, settings), KEY("optional", switch_read, file_view, view.optional),
 };
 static const key_info reference_keys[] = {
     NEEDED("name", file_name_read, file_reference, reference.name),
