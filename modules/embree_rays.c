@@ -116,15 +116,12 @@ static RTCScene mesh_create(embree_rays *rays, const scene_mesh *mesh)
     return scene;
 }
 
-embree_rays *embree_rays_create(const scene_data *scene, const float (*positions)[3], const uint32_t *indices,
-                                log_level level)
+embree_rays *embree_rays_create(const scene_data *scene, const float (*positions)[3], const uint32_t *indices)
 {
     // Building on one thread makes the same tree every time; it takes 140 ms for Sponza's 262K triangles, once.
     RTCDevice device = rtcNewDevice("threads=1");
-    if (!device) {
-        log_write(level, "Embree: no device (error %d)", (int)rtcGetDeviceError(NULL));
+    if (!device)
         return NULL;
-    }
     embree_rays *rays = memory_alloc(sizeof *rays);
     *rays = (embree_rays){.scene = scene, .positions = positions, .indices = indices, .device = device};
     rtcSetDeviceErrorFunction(device, error_note, rays);
@@ -253,16 +250,21 @@ static void nearest_run(uint32_t begin, uint32_t end, void *user)
     }
 }
 
+static void batch_run(embree_rays *rays, uint32_t count, void (*run)(uint32_t begin, uint32_t end, void *user), batch b)
+{
+    b.scene = rays->instances;
+    if (!rays->failed)
+        parallel_for(rays->pool, count, CHUNK, run, &b);
+}
+
 void embree_rays_visible(embree_rays *rays, const float (*origins)[4], const float (*directions)[4], uint32_t *visible,
                          uint32_t count)
 {
-    batch b = {.scene = rays->instances, .origins = origins, .directions = directions, .visible = visible};
-    parallel_for(rays->pool, count, CHUNK, visible_run, &b);
+    batch_run(rays, count, visible_run, (batch){.origins = origins, .directions = directions, .visible = visible});
 }
 
 void embree_rays_nearest(embree_rays *rays, const float (*origins)[4], const float (*directions)[4], ray_hit *hits,
                          uint32_t count)
 {
-    batch b = {.scene = rays->instances, .origins = origins, .directions = directions, .hits = hits};
-    parallel_for(rays->pool, count, CHUNK, nearest_run, &b);
+    batch_run(rays, count, nearest_run, (batch){.origins = origins, .directions = directions, .hits = hits});
 }

@@ -8,16 +8,16 @@ typedef struct embree_rays embree_rays;
 
 // Shares the memory of `positions` (vertex_count of the scene, mesh space) and `indices` (index_count): no copy is
 // made, so both outlive the tracer and keep their contents. 16 bytes behind the last position must be readable. `scene`
-// outlives the tracer too. NULL when there is no Embree device (logged as `level`).
-embree_rays *embree_rays_create(const scene_data *scene, const float (*positions)[3], const uint32_t *indices,
-                                log_level level);
+// outlives the tracer too. NULL when there is no Embree device (not logged).
+embree_rays *embree_rays_create(const scene_data *scene, const float (*positions)[3], const uint32_t *indices);
 void embree_rays_destroy(embree_rays *rays); // accepts NULL
 
 // Makes the tracer follow the instances; hits count in them. Meshes are built when first instanced, and what did not
 // move costs a comparison. Matrices are invertible. False when Embree failed (logged).
 bool embree_rays_update(embree_rays *rays, const mesh_instance_gpu *instances, uint32_t count);
 
-// Answer `count` rays, as modules/rays.h has them, on all CPUs. The same rays get the same answers every time.
+// Answer `count` rays, as modules/rays.h has them, on all CPUs; none once Embree has failed. The same rays get the same
+// answers every time.
 void embree_rays_visible(embree_rays *rays, const float (*origins)[4], const float (*directions)[4], uint32_t *visible,
                          uint32_t count);
 void embree_rays_nearest(embree_rays *rays, const float (*origins)[4], const float (*directions)[4], ray_hit *hits,

@@ -2,8 +2,8 @@
 // (Kajiya 1986; Veach 1997, chapter 9). A path's first vertex is what the G-buffer holds for the pixel, at its centre,
 // with the same normal maps as the other methods have, so that errors against this reference compare like with like;
 // later vertices are Lambertian with the geometric normal, and every surface reflects on both sides, as virtual point
-// lights have it. At each vertex one ray goes to a punctual light, one to an emissive triangle and one on along the path,
-// until `bounces` indirect bounces are made. Nothing is clamped, and no path is ended by chance.
+// lights have it. At each vertex one ray goes to a punctual light, one to an emissive triangle and one on along the
+// path, until `bounces` indirect bounces are made. Nothing is clamped, and no path is ended by chance.
 //
 // Paths advance together, a vertex at a time: a frame's paths are layers of one path a pixel, path = layer * pixels +
 // pixel. Random numbers are keyed by pixel, sample and vertex, so a picture does not depend on how many a frame takes.

@@ -192,7 +192,8 @@ bool progressive_save(renderer *r, const char *path, const char *identity)
         .rays = state->rays,
     };
     memcpy(header.magic, state_magic, sizeof header.magic);
-    const size_t sums_at = sizeof header + header.identity_size, hash_at = sums_at + sums_size(state->width, state->height);
+    const size_t sums_at = sizeof header + header.identity_size,
+                 hash_at = sums_at + sums_size(state->width, state->height);
     uint8_t *bytes = memory_alloc(hash_at + sizeof(uint64_t));
     memcpy(bytes, &header, sizeof header);
     memcpy(bytes + sizeof header, identity, header.identity_size);
@@ -212,8 +213,8 @@ static const char *state_damage(const uint8_t *bytes, size_t size, state_header 
     memcpy(header, bytes, sizeof *header);
     if (header->version != STATE_VERSION)
         return "it was written by another version of this program";
-    const uint64_t expected = sizeof *header + (uint64_t)header->identity_size +
-                              sums_size(header->width, header->height) + sizeof(uint64_t);
+    const uint64_t expected =
+        sizeof *header + (uint64_t)header->identity_size + sums_size(header->width, header->height) + sizeof(uint64_t);
     if (size != expected)
         return size < expected ? "it is cut short" : "it is longer than it says";
     uint64_t hash;
@@ -400,7 +401,8 @@ void progressive_end(renderer *r, uint64_t count, const float factors[2], bool h
     frame_graph_create_resource(pass, "radiance", &image, ACCESS_STORAGE_WRITE);
     frame_graph_create_resource(pass, "progressive_error", &error, ACCESS_STORAGE_WRITE);
     frame_graph_export(r->graph, "progressive_error", ACCESS_TRANSFER_READ);
-    for (size_t i = 0; i < countof(ray_counters); i++)
+    // Keeping a counter keeps the pass that counts, and path tracing needs no others than its own.
+    for (size_t i = 0; i < (s->method == METHOD_PATH ? 1 : countof(ray_counters)); i++)
         frame_graph_export(r->graph, ray_counters[i], ACCESS_TRANSFER_READ);
 }
 

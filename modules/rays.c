@@ -148,22 +148,29 @@ static void scene_update(const frame_graph_context *context, void *user)
     r->failed |= !embree_rays_update(state_of(r)->embree, w->instance_data, w->instance_count);
 }
 
-// False where --rays asks for what cannot be had (logged).
+static void embree_make(renderer *r, rays_state *state)
+{
+    const world_gpu *w = r->gpu_world;
+    state->embree =
+        embree_rays_create(r->scene, gpu_buffer_map(r->gpu, w->positions), gpu_buffer_map(r->gpu, w->indices));
+    state->no_embree = !state->embree;
+    if (state->no_embree && r->settings.rays == RAYS_AUTO)
+        log_info("--rays auto: Embree has no device here; rays are traced by query");
+}
+
+// Has Embree ready where it shall trace. False where --rays asks for what cannot be had (logged).
 static bool embree_require(renderer *r, rays_state *state)
 {
-    const bool asked = r->settings.rays == RAYS_EMBREE;
-    if (asked && !gpu_is_cpu(r->gpu)) {
-        log_error("--rays embree: traces in the memory of the CPU, and %s is not a CPU; expected auto or query",
+    if (rays_are_host(r) && !state->embree)
+        embree_make(r, state);
+    if (r->settings.rays != RAYS_EMBREE || state->embree)
+        return true;
+    if (gpu_is_cpu(r->gpu))
+        log_error("--rays embree: Embree has no device here; expected auto or query");
+    else
+        log_error("--rays embree: Embree traces in the memory of a CPU, and %s is none; expected auto or query",
                   gpu_name(r->gpu));
-        return false;
-    }
-    if (rays_are_host(r) && !state->embree) {
-        const world_gpu *w = r->gpu_world;
-        state->embree = embree_rays_create(r->scene, gpu_buffer_map(r->gpu, w->positions),
-                                           gpu_buffer_map(r->gpu, w->indices), asked ? LOG_ERROR : LOG_INFO);
-        state->no_embree = !state->embree;
-    }
-    return !asked || !state->no_embree;
+    return false;
 }
 
 static void rays_setup(renderer *r, void *user)

@@ -2,6 +2,7 @@
 //
 //     device_rays                      the tests
 //     device_rays bench SCENE [RAYS]   millions of shadow rays per second: by query, by Embree, and by Embree alone
+#include "engine/gpu_internal.h"
 #include "engine/parallel.h"
 #include "modules/rays.h"
 #include "modules/world.h"
@@ -590,14 +591,54 @@ TEST(only_the_structure_that_is_traced_is_built)
     renderer_destroy(r);
 }
 
-TEST(auto_is_embree_on_a_cpu_and_query_elsewhere)
+static char last_error[256];
+static uint32_t errors;
+
+static void error_keep(log_level level, const char *line, void *user)
+{
+    (void)user;
+    if (level == LOG_ERROR) {
+        errors++;
+        snprintf(last_error, sizeof last_error, "%s", line);
+    }
+}
+
+// Any device that is not a CPU will do, and this one can say so.
+TEST(embree_is_refused_where_the_device_is_not_a_cpu)
+{
+    const VkPhysicalDeviceType type = device->properties.deviceType;
+    device->properties.deviceType = VK_PHYSICAL_DEVICE_TYPE_DISCRETE_GPU;
+    quad_scene s;
+    quad_scene_init(&s);
+    quad_add(&s, IDENTITY);
+    renderer *r = renderer_of(&s.data);
+    const ray down = {{0, 0, 2}, 4, {0, 0, -1}, 0};
+    answers a = trace(r, RAYS_QUERY, &down, 1);
+    CHECK(a.hits[0].instance == 0);
+    answers_free(&a);
+    r->settings.rays = RAYS_EMBREE;
+    errors = 0;
+    log_sink_set(error_keep, NULL);
+    CHECK(!renderer_frame(r));
+    log_sink_set(NULL, NULL);
+    CHECK(errors == 1 && strstr(last_error, "--rays embree") && strstr(last_error, gpu_name(device)));
+    r->settings.rays = RAYS_AUTO;
+    CHECK(renderer_frame(r) && !rays_are_host(r) && pass_ran(r, "acceleration"));
+    renderer_destroy(r);
+    device->properties.deviceType = type;
+}
+
+TEST(auto_is_embree_where_the_device_is_a_cpu)
 {
     quad_scene s;
     quad_scene_init(&s);
     quad_add(&s, IDENTITY);
     renderer *r = renderer_of(&s.data);
+    const ray down = {{0, 0, 2}, 4, {0, 0, -1}, 0};
+    answers a = trace(r, RAYS_QUERY, &down, 1);
+    answers_free(&a);
     r->settings.rays = RAYS_AUTO;
-    CHECK(rays_are_host(r) == gpu_is_cpu(device));
+    CHECK(renderer_frame(r) && rays_are_host(r) && pass_ran(r, "rays/scene"));
     renderer_destroy(r);
 }
 
@@ -784,6 +825,11 @@ int main(int argc, char **argv)
         printf("skipped: no device with the validation layer\n");
         return 77;
     }
+    if (!gpu_is_cpu(device)) {
+        printf("skipped: %s is not a CPU, so that there is no Embree to compare with\n", gpu_name(device));
+        gpu_destroy(device);
+        return 77;
+    }
     if (bench)
         return print_bench(argv[2], argc > 3 ? (uint32_t)strtoul(argv[3], NULL, 10) : 230400);
     RUN(rays_find_the_nearest_quad_within_their_reach);
@@ -795,7 +841,8 @@ int main(int argc, char **argv)
     RUN(an_empty_batch_is_traced);
     RUN(embree_gives_the_same_bytes_every_time);
     RUN(only_the_structure_that_is_traced_is_built);
-    RUN(auto_is_embree_on_a_cpu_and_query_elsewhere);
+    RUN(embree_is_refused_where_the_device_is_not_a_cpu);
+    RUN(auto_is_embree_where_the_device_is_a_cpu);
     RUN(the_validation_layer_is_silent);
     gpu_destroy(device);
     return test_end();
