@@ -19,7 +19,7 @@ enum {
     UNSHADOWED_PAIRS = 1 << 25, // of pixel and slot in a frame without rays, about: fractions of a second
     BATCHES_MAX = 150, // in a frame: minutes of tracing, and about as many passes as there are timestamps
     GROUP = 128, // pixels of a workgroup: 64 would make more workgroups of RAYS_BATCH pixels than there may be
-    LAYERS = 16, // of an invocation of vpl_reference.rays.comp.glsl
+    LAYERS = 16, // of an invocation that makes rays: few enough to fill a GPU, many to read the G-buffer seldom
     NAME_SIZE = 40,
 };
 

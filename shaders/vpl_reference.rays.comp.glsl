@@ -8,18 +8,17 @@
 #include "ray_count.glsl.h"
 #include "vpl_reference.glsl.h"
 
-const uint LAYERS = 16u; // of one invocation; y: groups of so many
-
 void main()
 {
     uint pixel = gl_GlobalInvocationID.x, pixels = frame.width * frame.height;
-    uint end = min((gl_GlobalInvocationID.y + 1u) * LAYERS, push.count);
+    uint layers = (push.count + gl_NumWorkGroups.y - 1u) / gl_NumWorkGroups.y; // of one invocation
+    uint begin = gl_WorkGroupID.y * layers, end = min(begin + layers, push.count);
     uint rays = 0u;
     if (pixel < pixels) {
         gbuffer_point p;
         bool drawn = pixel_read(pixel, p);
         vec3 origin = offset_origin(p.position, p.geometric, frame.scene_radius);
-        for (uint layer = gl_GlobalInvocationID.y * LAYERS; layer < end; layer++) {
+        for (uint layer = begin; layer < end; layer++) {
             uint slot = push.first + layer, ray = layer * pixels + pixel;
             if (drawn && luminance(slot_light(slot, p)) > 0.0) {
                 ray_write_to(ray, origin, vpls[slot].position);
