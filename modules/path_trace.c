@@ -215,7 +215,6 @@ static void path_trace_setup(renderer *r, void *user)
             .pixels = pixels,
             .count = (uint32_t)count * pixels,
             .first_sample = (uint32_t)done,
-            .light_power = r->gpu_world->light_power,
         };
         counter_declare(r);
         start_declare(r, user, step);

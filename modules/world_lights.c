@@ -131,16 +131,20 @@ static bool emitter_place(const scene_data *s, const mesh_instance_gpu *instance
     return true;
 }
 
-// Appends the primitive's triangles that give light at `emitters` and `powers`; returns how many.
-static uint32_t emitters_append(const renderer *r, const mesh_instance_gpu *instance, uint32_t primitive,
-                                emissive_triangle *emitters, float *powers)
+// Appends the triangles that give light of one primitive of the instance `index` at `emitters` and `powers`; returns how
+// many.
+static uint32_t emitters_append(const renderer *r, uint32_t index, uint32_t geometry, emissive_triangle *emitters,
+                                float *powers)
 {
     const scene_data *s = r->scene;
+    const mesh_instance_gpu *instance = &r->gpu_world->instance_data[index];
+    const uint32_t primitive = instance->first_primitive + geometry;
     const mesh_primitive *p = &s->primitives[primitive];
     float(*means)[3] = r->gpu_world->light_state->triangle_emission[primitive];
     uint32_t count = 0;
     for (uint32_t t = 0; t < p->index_count / 3; t++) {
-        emissive_triangle emitter = {.textured = means != NULL};
+        emissive_triangle emitter = {
+            .textured = means != NULL, .instance = index, .geometry = geometry, .triangle = t};
         uint32_t vertices[3];
         triangle_vertices(s, p, t, vertices);
         memcpy(emitter.emission, means ? means[t] : s->materials[p->material].emissive, sizeof emitter.emission);
@@ -173,8 +177,7 @@ static bool emitters_gather(renderer *r)
         for (uint32_t k = 0; k < w->instance_data[i].primitive_count; k++) {
             const uint32_t primitive = w->instance_data[i].first_primitive + k;
             if (world_material_emits(r, s->primitives[primitive].material))
-                count += emitters_append(r, &w->instance_data[i], primitive, emitters + count,
-                                         state->emitter_powers + count);
+                count += emitters_append(r, i, k, emitters + count, state->emitter_powers + count);
         }
     r->constants.emitter_count = count;
     return true;

@@ -17,19 +17,13 @@ float mis_weight(float pdf, float other)
 
 // ---- Densities
 
-// The density, per square metre, with which points of an emissive triangle count as chosen in the weights: that of
-// emitter_at, but for textured triangles, where it goes by the material instead of the triangle's mean, so that a hit
-// needs no index of an emitter. Both strategies use this one function, so their weights add up to 1 all the same. 0: only
-// the rays that hit it by chance count. So it is for alpha masks, whose holes points on the triangle do not know of.
-float emitter_density(material m, float area)
+// The density, per square metre, with which points of an emissive triangle are chosen. 0: only rays that hit it by chance
+// count, as for triangles with an alpha mask, since points on them do not know of its holes.
+float emitter_density(uint triangle)
 {
-    if (frame.emitter_count == 0u || (m.flags & MATERIAL_ALPHA_MASK) != 0u)
-        return 0.0;
-    float share = emitter_share();
-    if (share < EMITTER_SHARE_MIN)
-        return 1.0 / (float(frame.emitter_count) * area);
-    float sides = (m.flags & MATERIAL_DOUBLE_SIDED) != 0u ? 2.0 : 1.0;
-    return PI * luminance(m.emissive) * sides / (push.light_power * share);
+    emissive_triangle e = emitters[triangle];
+    bool is_masked = (materials[e.material].flags & MATERIAL_ALPHA_MASK) != 0u;
+    return is_masked ? 0.0 : emitter_probability(triangle, emitter_share()) / e.area;
 }
 
 // The same per steradian, seen from a point at this distance and height over the triangle's plane.
@@ -45,8 +39,9 @@ struct path_ray {
     float pdf; // per steradian
 };
 
-// Emission at a hit, with the weight of rays that hit emitters by chance. As for samples of them, what is seen in its
-// plane but for rounding could not have been chosen.
+// Emission at a hit, with the weight of rays that hit emitters by chance. What could not have been chosen counts in full:
+// triangles that are no known emitters (the mean of their texture is black), and what is seen in its plane but for
+// rounding.
 vec3 hit_emission(surface_hit hit, surface_vertices v, path_ray ray)
 {
     material m = materials[v.material];
@@ -63,13 +58,13 @@ vec3 hit_emission(surface_hit hit, surface_vertices v, path_ray ray)
     e.corner = instance_to_world(instance, positions[v.vertex.x]);
     e.edge1 = instance_to_world(instance, positions[v.vertex.y]) - e.corner;
     e.edge2 = instance_to_world(instance, positions[v.vertex.z]) - e.corner;
-    vec3 across = cross(e.edge1, e.edge2);
-    e.normal = normalize(across) * (instance.mirrored != 0u ? -1.0 : 1.0);
+    e.normal = normalize(cross(e.edge1, e.edge2)) * (instance.mirrored != 0u ? -1.0 : 1.0);
     e.two_sided = (m.flags & MATERIAL_DOUBLE_SIDED) != 0u ? 1u : 0u;
     if (e.two_sided == 0u && dot(e.normal, ray.direction) >= 0.0)
         return vec3(0.0);
     float distance = length(e.corner + w.y * e.edge1 + w.z * e.edge2 - ray.origin);
-    float density = emitter_density(m, 0.5 * length(across));
+    uint triangle = emitter_find(hit);
+    float density = triangle < frame.emitter_count ? emitter_density(triangle) : 0.0;
     float other = emitter_density_towards(density, distance, emitter_height(e, ray.origin));
     return emission * mis_weight(ray.pdf, other);
 }
@@ -128,7 +123,8 @@ light_sample punctual_sample(gbuffer_point point, vec2 u)
 light_sample emitter_sample(gbuffer_point point, vec3 u)
 {
     float probability;
-    emissive_triangle e = emitters[emitter_at(u.x, emitter_share(), probability)];
+    uint triangle = emitter_at(u.x, emitter_share(), probability);
+    emissive_triangle e = emitters[triangle];
     vec2 barycentrics = triangle_point(u.yz);
     vec3 end = e.corner + barycentrics.x * e.edge1 + barycentrics.y * e.edge2;
     vec3 offset = end - point.position;
@@ -136,8 +132,7 @@ light_sample emitter_sample(gbuffer_point point, vec3 u)
     vec3 light = emitter_light(e, barycentrics, point) * (e.area / probability);
     if (light == vec3(0.0))
         return light_sample(light, offset, distance);
-    float density = emitter_density(materials[e.material], e.area);
-    float pdf = emitter_density_towards(density, distance, emitter_height(e, point.position));
+    float pdf = emitter_density_towards(emitter_density(triangle), distance, emitter_height(e, point.position));
     light *= mis_weight(pdf, dot(point.shading, offset) / (distance * PI));
     // Off the emitter's plane on the lit side, so that the ray cannot hit the emitter itself.
     vec3 side = dot(e.normal, offset) < 0.0 ? e.normal : -e.normal;

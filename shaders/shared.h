@@ -134,7 +134,10 @@ SHARED_STRUCT(emissive_triangle) {
     SHARED_VEC2(uv0);    // for the emissive texture, transform applied
     SHARED_VEC2(uv1);
     SHARED_VEC2(uv2);
-} SHARED_END(emissive_triangle, 104)
+    uint instance;  // where a ray hits it, as ray_hit has it; the array is sorted by these three
+    uint geometry;
+    uint triangle;
+} SHARED_END(emissive_triangle, 116)
 
 // ---- Rays
 
@@ -165,8 +168,7 @@ SHARED_STRUCT(path_step) {
     uint first_sample; // of this frame: sample = first_sample + layer
     uint vertex;       // 0 is what the pixel sees
     uint flags;        // PATH_*
-    float light_power; // of all light sources, as their distribution has it
-} SHARED_END(path_step, 24)
+} SHARED_END(path_step, 20)
 
 // ---- Virtual point lights
 
