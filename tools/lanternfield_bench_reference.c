@@ -70,9 +70,14 @@ static char *identity_with_length(const render_session *session, const render_re
     char *text;
     size_t size;
     FILE *const out = open_memstream(&text, &size);
-    char until[32];
-    settings_get(&request->settings, settings_find("until"), until);
-    fprintf(out, "%sspp %u\nuntil %s\nframes %u\n", identity, request->settings.spp, until, request->settings.frames);
+    fputs(identity, out);
+    if (request->settings.method == METHOD_PATH) {
+        char until[32];
+        settings_get(&request->settings, settings_find("until"), until);
+        fprintf(out, "spp %u\nuntil %s\n", request->settings.spp, until);
+    } else if (!progressive_is(session->renderer)) {
+        fprintf(out, "frames %u\n", request->settings.frames);
+    }
     fclose(out);
     free(identity);
     return text;
