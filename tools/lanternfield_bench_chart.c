@@ -720,7 +720,7 @@ static void layout(chart *c)
     const uint32_t rows = div_up_u32(c->panel_count, c->columns);
     const double panel_width = single ? 560 : c->columns == 2 ? 430 : 370, panel_height = single ? 380 : 340;
     const double cell_width = LEFT_MARGIN + panel_width + RIGHT_MARGIN;
-    const double cell_height = (single ? 0 : PANEL_TITLE_HEIGHT) + panel_height + BOTTOM_MARGIN;
+    const double cell_height = (c->panels[0].title ? PANEL_TITLE_HEIGHT : 0) + panel_height + BOTTOM_MARGIN;
     c->key_left = c->columns * cell_width;
     c->width = fmax(c->key_left + key_width(c), text_width(c->desc->title, TITLE_FONT) + LEFT_MARGIN);
     footnotes_make(c);
