@@ -104,6 +104,12 @@ bench tiny.json -o once --fresh-references || fail "exit code $?: $(cat stderr)"
 [ "$(lines once/journal.jsonl reference truth)" = 2 ] || fail "--fresh-references rendered none"
 cmp once/results.csv before.csv || fail "results.csv with the fresh reference differs"
 
+echo "a damaged line is measured again"
+cp -r once damaged
+printf '{"kind":"times\0"}\n' >>damaged/journal.jsonl
+bench tiny.json -o damaged || fail "exit code $?: $(cat stderr)"
+{ grep -q "damaged" stderr && cmp damaged/results.csv before.csv; } || fail "a damaged line: $(cat stderr)"
+
 echo "a changed option is measured anew, alone"
 suite changed.json '{"sweep": {"alpha": [1, 3]}}' "$references"
 bench changed.json -o once || fail "exit code $?: $(cat stderr)"

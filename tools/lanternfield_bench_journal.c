@@ -86,11 +86,12 @@ static bool entry_add(bench_journal *journal, cJSON *json)
     return true;
 }
 
-static void lines_read(bench_journal *journal, char *text)
+static void lines_read(bench_journal *journal, char *text, size_t size)
 {
     uint32_t number = 1;
-    for (char *line = text; *line; number++) {
-        char *const end = strchr(line, '\n');
+    for (char *line = text; line < text + size; number++) {
+        // There is an end, for torn lines are cut; zeros, which a crash of the system may leave, end nothing.
+        char *const end = memchr(line, '\n', (size_t)(text + size - line));
         *end = 0;
         if (!entry_add(journal, cJSON_Parse(line))) {
             log_warning("%s:%u: damaged; what it held is measured again", journal->path, number);
@@ -134,7 +135,7 @@ bench_journal *bench_journal_open(const char *folder)
         log_error("cannot write \"%s\": %s", journal->path, strerror(errno));
         goto fail;
     }
-    lines_read(journal, text);
+    lines_read(journal, text, size);
     free(text);
     return journal;
 
