@@ -239,7 +239,10 @@ suite broken.json "$sweep"
 sed -i "s|$scene|$work/no-such.glb|" broken.json
 refuses "views[0].scene: there is no readable file" 1 broken.json -o none
 refuses "no-such.json" 1 no-such.json -o none
-refuses "--views" 1 tiny.json -o none --views attic
+refuses '--views: tiny.json has no view "attic"' 1 tiny.json -o none --views=box,attic
+refuses "-o: its value is missing" 2 tiny.json -o ''
+refuses "--references: its value is missing" 2 tiny.json -o none --references=
+refuses "--validate: it takes no value" 2 tiny.json -o none --validate=1
 refuses "bench needs a SUITE.json" 2 -o none
 refuses "bench needs -o DIR" 2 tiny.json
 refuses "unknown option --frobnicate" 2 tiny.json -o none --frobnicate

@@ -24,6 +24,7 @@ static const struct {
     {"--fresh-references", NULL, offsetof(bench_options, fresh_references), "render references even if they are there"},
     {"--report-only", NULL, offsetof(bench_options, report_only), "make CSV, charts and report of what is measured"},
     {"--help", NULL, offsetof(bench_options, help), "print this"},
+    {"-h", NULL, offsetof(bench_options, help), NULL},
 };
 
 static void help_print(void)
@@ -33,12 +34,13 @@ static void help_print(void)
         "Measures the configurations of a suite: times, lights and rays per pixel, memory, errors against references.\n"
         "Stopped at any moment and started again, it goes on where it was. The keys of a suite are described in\n"
         "assets/suites/README.md.\n");
-    for (size_t i = 0; i < countof(option_table); i++) {
+    for (size_t i = 0; i < countof(option_table) && option_table[i].help; i++) {
         const char *const value_name = option_table[i].value_name;
         char left[40];
         snprintf(left, sizeof(left), "%s %s", option_table[i].name, value_name ? value_name : "");
         printf("  %-20s %s\n", left, option_table[i].help);
     }
+    puts("\nCtrl-C writes what there is. Exit codes: 0 done, 1 failed, 2 wrong usage, 130 interrupted.");
 }
 
 static int wrong_usage(const char *what, const char *word)
@@ -49,29 +51,30 @@ static int wrong_usage(const char *what, const char *word)
 
 static int option_read(bench_options *options, int argc, char **argv, int *i)
 {
+    const char *const word = argv[*i], *const equals = strchr(word, '=');
+    const size_t length = equals ? (size_t)(equals - word) : strlen(word);
     for (size_t o = 0; o < countof(option_table); o++) {
-        if (strcmp(argv[*i], option_table[o].name) != 0) {
+        const char *const name = option_table[o].name;
+        if (strlen(name) != length || strncmp(word, name, length) != 0) {
             continue;
         }
         void *const member = (char *)options + option_table[o].offset;
         if (!option_table[o].value_name) {
             *(bool *)member = true;
-        } else if (*i + 1 == argc) {
-            return wrong_usage(argv[*i], ": its value is missing");
-        } else {
-            *(const char **)member = argv[++*i];
+            return equals ? wrong_usage(name, ": it takes no value") : EXIT_DONE;
         }
-        return EXIT_DONE;
+        const char *const value = equals ? equals + 1 : *i + 1 < argc ? argv[++*i] : "";
+        *(const char **)member = value;
+        return *value ? EXIT_DONE : wrong_usage(name, ": its value is missing");
     }
-    return wrong_usage("unknown option ", argv[*i]);
+    return wrong_usage("unknown option ", word);
 }
 
 static int options_read(bench_options *options, int argc, char **argv)
 {
     for (int i = 0; i < argc; i++) {
         if (argv[i][0] == '-') {
-            const int code =
-                strcmp(argv[i], "-h") == 0 ? (options->help = true, EXIT_DONE) : option_read(options, argc, argv, &i);
+            const int code = option_read(options, argc, argv, &i);
             if (code != EXIT_DONE) {
                 return code;
             }
@@ -87,12 +90,24 @@ static int options_read(bench_options *options, int argc, char **argv)
     return options->help || options->folder ? EXIT_DONE : wrong_usage("bench needs -o DIR", "");
 }
 
+// The item of "a,b,c" after this one; NULL: there is none.
+static const char *item_next(const char *item)
+{
+    const char *const comma = strchr(item, ',');
+    return comma ? comma + 1 : NULL;
+}
+
+// Whether this item of "a,b,c" is a name.
+static bool item_is(const char *item, const char *name)
+{
+    return strcspn(item, ",") == strlen(name) && strncmp(item, name, strlen(name)) == 0;
+}
+
 // Whether a name is in "a,b,c"; all are when the list is NULL.
 static bool list_names(const char *list, const char *name)
 {
-    const size_t length = strlen(name);
-    for (const char *item = list; item; item = strchr(item, ',') ? strchr(item, ',') + 1 : NULL) {
-        if (strcspn(item, ",") == length && strncmp(item, name, length) == 0) {
+    for (const char *item = list; item; item = item_next(item)) {
+        if (item_is(item, name)) {
             return true;
         }
     }
@@ -111,15 +126,29 @@ const char *bench_path(bench_run *run, const char *name)
 
 // ---- Before any work: are the views there, and their scenes?
 
-static bool views_check(bench_run *run)
+static bool view_names_check(const bench_run *run)
 {
-    uint32_t named = 0, selected = 0;
+    for (const char *item = run->options.views; item; item = item_next(item)) {
+        bool found = false;
+        for (uint32_t v = 0; v < run->suite->view_count; v++) {
+            found = found || item_is(item, run->suite->views[v].name);
+        }
+        if (!found) {
+            log_error("--views: %s has no view \"%.*s\"", run->suite->path, (int)strcspn(item, ","), item);
+            return false;
+        }
+    }
+    return true;
+}
+
+static bool scenes_check(bench_run *run)
+{
+    uint32_t selected = 0;
     for (uint32_t v = 0; v < run->suite->view_count; v++) {
         bench_view *const view = &run->suite->views[v];
         if (!list_names(run->options.views, view->name)) {
             continue;
         }
-        named++;
         const bool is_missing = !run->options.report_only && access(view->scene, R_OK) != 0;
         if (is_missing && !view->optional) {
             log_error("%s: views[%u].scene: there is no readable file \"%s\"", run->suite->path, v, view->scene);
@@ -131,9 +160,7 @@ static bool views_check(bench_run *run)
             log_warning("%s: view \"%s\" is left out: there is no file \"%s\"", run->suite->path, view->name, view->scene);
         }
     }
-    if (named == 0) {
-        log_error("--views: %s has no view of \"%s\"", run->suite->path, run->options.views);
-    } else if (selected == 0) {
+    if (selected == 0) {
         log_error("%s: none of its scenes is there", run->suite->path);
     }
     return selected > 0;
@@ -194,7 +221,7 @@ static bool run_open(bench_run *run)
 {
     run->start = time_now();
     run->suite = bench_suite_read(run->options.suite);
-    if (!run->suite || !views_check(run)) {
+    if (!run->suite || !view_names_check(run) || !scenes_check(run)) {
         return false;
     }
     if (!run->options.references) {
