@@ -116,6 +116,13 @@ bench changed.json -o once || fail "exit code $?: $(cat stderr)"
 grep -q "2 rows, 1 reused" stdout || fail "closing line: $(cat stdout)"
 [ "$(lines once/journal.jsonl times alpha=1)" = 2 ] || fail "alpha=1 was measured again"
 
+suite lights.json '{"sweep": {"alpha": [1, 3]}}' "$references \"pictures\": [{\"title\": \"Lights\", \"what\": \"lights-per-pixel\"}],"
+bench lights.json -o once || fail "exit code $?: $(cat stderr)"
+{ grep -q "2 rows, 1 reused" stdout && ls once/images/*alpha_3*.lights.exr >/dev/null; } ||
+  fail "a picture of lights that the suite asks for later is not made: $(cat stdout)"
+rm once/images/*alpha_3*.lights.exr
+bench lights.json -o once || fail "a picture of lights that is gone is not made again: exit code $?: $(cat stderr)"
+
 echo "killed in the middle, started again"
 endless='{"sweep": {"alpha": [1]}}, {"name": "alpha=2", "settings": {"alpha": 2, "frames": 1000000}}'
 suite endless.json "$endless" "$references"

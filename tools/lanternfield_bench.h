@@ -190,7 +190,8 @@ bool bench_folder_make(const char *path); // also its parents; false: logged
 // The journal: what is finished, one JSON object a line, each with "kind" and "key". Only ever appended to, so that
 // a process that ends at any moment loses nothing but the line it was writing.
 //   times      key of the row; view, configuration, repeat, frames [ms], picture_ms, passes and steps {name: [ms]}
-//   row        key of the row; view, configuration, device, image, lights_image, lights_per_pixel, ...
+//   row        key of the row; view, configuration, device, image, lights_per_pixel, ...; where the suite shows it
+//              lights_image, null when there are no lights to count
 //   slow       key of the row; view, configuration, seconds of one frame: more than the time limit
 //   reference  its key; view, reference, image, done, error, seconds
 //   errors     contents of image and reference, "KEY-KEY"; the measures by name

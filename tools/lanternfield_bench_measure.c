@@ -321,6 +321,9 @@ static bool row_write(bench_run *run, const bench_row *row, const repeat *repeat
         cJSON_Delete(line);
         return false;
     }
+    if (lights_are_shown(run->suite, row->configuration->name) && !cJSON_HasObjectItem(line, "lights_image")) {
+        cJSON_AddNullToObject(line, "lights_image"); // was asked for, but there are no lights to count
+    }
     return row_line_add(run, row, "row", line);
 }
 
@@ -405,13 +408,28 @@ static int rows_measure(bench_run *run)
     return code;
 }
 
+static bool image_is_there(bench_run *run, const char *image)
+{
+    return image && access(bench_path(run, image), R_OK) == 0;
+}
+
+// Whether all pictures that the report shows of a row are there, or cannot be made.
+static bool images_are_there(bench_run *run, const bench_row *row)
+{
+    size_t place = 0;
+    const cJSON *const line = bench_journal_next(run->journal, "row", row->key, &place);
+    const bool lights_made =
+        !lights_are_shown(run->suite, row->configuration->name) || cJSON_HasObjectItem(line, "lights_image");
+    return lights_made && image_is_there(run, row->image) &&
+           (!row->lights_image || image_is_there(run, row->lights_image));
+}
+
 // What is in the journal under the row's key is not measured again.
 static uint32_t row_pending(bench_run *run, bench_row *row)
 {
     bench_key_print(row_key(run, row), row->key);
     bench_row_collect(&run->results, row, run->journal);
-    const bool has_image = row->image && access(bench_path(run, row->image), R_OK) == 0;
-    if (row->skipped || (row->done && has_image)) {
+    if (row->skipped || (row->done && images_are_there(run, row))) {
         run->reused++;
         return 0;
     }
