@@ -157,7 +157,8 @@ static bool scenes_check(bench_run *run)
         view->absent = is_missing;
         selected += !view->absent;
         if (is_missing) {
-            log_warning("%s: view \"%s\" is left out: there is no file \"%s\"", run->suite->path, view->name, view->scene);
+            log_warning("%s: view \"%s\" is left out: there is no file \"%s\"", run->suite->path, view->name,
+                        view->scene);
         }
     }
     if (selected == 0) {

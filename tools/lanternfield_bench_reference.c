@@ -104,18 +104,19 @@ static int progressive_render(const bench_reference_desc *desc, const render_req
                               const reference_files *files, const char *identity, reference_info *info)
 {
     renderer *const r = desc->session->renderer;
-    const double before = info->seconds, budget = desc->reference->budget_s;
     progressive_run run = {0};
     int code = EXIT_FAILED;
     if (!progressive_run_begin(&run, desc->session, request)) {
         // Logged: the state is damaged, or another program's. What it held is rendered again.
         unlink(files->state);
+        *info = (reference_info){.error = NAN};
         progressive_run_fini(&run);
         progressive_restart(r);
         if (!progressive_run_begin(&run, desc->session, request)) {
             goto done;
         }
     }
+    const double before = info->seconds, budget = desc->reference->budget_s;
     info->picture = false;
     double saved_at = run.saved_at;
     for (bool enough = false; !enough && !interrupt_seen();) {
