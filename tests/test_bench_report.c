@@ -51,7 +51,8 @@ static const bench_configuration configurations[ROWS] = {
     {.name = "a", .series = "S"}, {.name = "b", .series = "S"},        {.name = "c", .series = "S"},
     {.name = "d", .series = "S"}, {.name = "slow|<e>", .series = "S"},
 };
-static const bench_reference reference = {.name = "path"};
+static const bench_setting reference_settings[] = {{"method", "path"}};
+static const bench_reference reference = {.name = "path", .settings = reference_settings, .setting_count = 1};
 static const bench_chart plain_chart = {.name = "chart",
                                         .title = "it's {a}_b <&> \\n",
                                         .x = "picture_ms",
@@ -265,15 +266,15 @@ TEST(what_was_skipped_is_named_with_the_reason)
     CHECK(count_of("report.md", "slow\\|") == 1); // in no table of results
 }
 
-TEST(a_view_that_a_configuration_does_not_have_is_not_missing)
+TEST(rows_of_a_scene_that_is_missing_say_so)
 {
-    bench_configuration elsewhere = configurations[4];
-    const char *const views[] = {"attic"};
-    elsewhere.views = views;
-    elsewhere.view_count = 1;
-    rows[4].configuration = &elsewhere;
+    rows[4].skipped = NULL;
     CHECK(bench_report_write(&results));
-    CHECK(!holds("report.md", "Left out"));
+    CHECK(holds("report.md", "| hall | slow\\|\\<e\\> | not measured yet |"));
+    view.absent = true;
+    CHECK(bench_report_write(&results));
+    CHECK(holds("report.md", "| hall | slow\\|\\<e\\> | the file of its scene is missing |"));
+    view.absent = false;
     results_make();
 }
 
@@ -285,7 +286,7 @@ TEST(pictures_are_inside_the_report)
     CHECK(count_of("report.html", "data:image/png;base64,iVBORw0KGgo") == 2 * 11 + 5);
     CHECK(count_of("report.html", "data:image/png") == 2 * 11 + 5);
     CHECK(!holds("report.html", "http") && !holds("report.html", "<script"));
-    CHECK(holds("report.html", "64 VPLs, 2,000 ms<br>estimates its own relative error at 1.23 %"));
+    CHECK(holds("report.html", "64 samples per pixel, 2,000 ms<br>estimates its own relative error at 1.23 %"));
     CHECK(holds("report.html", "12 lights per pixel"));
     CHECK(holds("report.html", " 50 &nbsp; lights per pixel"));
 }
@@ -457,7 +458,7 @@ int main(void)
     RUN(the_best_of_a_column_is_bold);
     RUN(ratios_stand_beside_the_paper);
     RUN(what_was_skipped_is_named_with_the_reason);
-    RUN(a_view_that_a_configuration_does_not_have_is_not_missing);
+    RUN(rows_of_a_scene_that_is_missing_say_so);
     RUN(pictures_are_inside_the_report);
     RUN(a_picture_that_cannot_be_read_fails_and_leaves_the_rest);
     RUN(nothing_measured_is_no_failure);

@@ -204,13 +204,16 @@ static void reference_figure_write(report *r, const gallery *g, const bench_refe
     if (!p.texels) {
         return;
     }
-    const bool path = strcmp(reference_method(result->reference), "path") == 0;
+    const char *const method = reference_method(result->reference);
+    const char *const unit = strcmp(method, "path") == 0  ? "samples per pixel"
+                             : strcmp(method, "vpl") == 0 ? "VPL slots"
+                                                          : "frames";
     fputs("<figure>", r->out);
     tone_mapped_write(r, g, result->reference->name, &p);
     fputs("<figcaption><b>reference: ", r->out);
     report_html_write(r->out, result->reference->name);
-    fprintf(r->out, "</b><br>%s %s, %s", bench_number(&r->memory, (double)result->done),
-            path ? "samples per pixel" : "VPLs", duration(r, 1e3 * result->seconds));
+    fprintf(r->out, "</b><br>%s %s, %s", bench_number(&r->memory, (double)result->done), unit,
+            duration(r, 1e3 * result->seconds));
     if (isfinite(result->error)) {
         fprintf(r->out, "<br>estimates its own relative error at %s %%", bench_number(&r->memory, 100 * result->error));
     }

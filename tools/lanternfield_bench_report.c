@@ -424,15 +424,6 @@ static void comparisons_write(report *r)
     table_write(r, &t);
 }
 
-static bool configuration_has_view(const bench_configuration *configuration, const bench_view *view)
-{
-    bool has = configuration->view_count == 0;
-    for (uint32_t i = 0; i < configuration->view_count; i++) {
-        has |= strcmp(configuration->views[i], view->name) == 0;
-    }
-    return has;
-}
-
 // Rows that were not measured, and why.
 static void skipped_write(report *r)
 {
@@ -444,11 +435,13 @@ static void skipped_write(report *r)
     titles[2].text = "reason";
     for (uint32_t i = 0; i < results->row_count; i++) {
         const bench_row *const row = &results->rows[i];
-        if (!row->done && configuration_has_view(row->configuration, row->view)) {
+        if (!row->done) {
             cell *const cells = table_row(&t);
             cells[0].text = row->view->name;
             cells[1].text = row->configuration->name;
-            cells[2].text = row->skipped ? row->skipped : "not measured yet";
+            cells[2].text = row->skipped        ? row->skipped
+                            : row->view->absent ? "the file of its scene is missing"
+                                                : "not measured yet";
         }
     }
     if (t.rows > 1) {
@@ -701,8 +694,8 @@ static void html_report_write(report *r)
     comparisons_write(r);
     tables_write(r);
     if (r->results->suite->picture_count > 0 && r->results->suite->reference_count > 0) {
-        paragraph_write(r, "Pictures are shown at the exposure of the first reference, which appears in place of a "
-                           "picture while the pointer is on it.");
+        paragraph_write(r, "Pictures of a view share one exposure: the suite's, or else that of the first reference, "
+                           "which appears in place of a picture while the pointer is on it.");
     }
     report_pictures_write(r);
     skipped_write(r);
