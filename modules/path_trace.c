@@ -72,7 +72,8 @@ static void execute(const frame_graph_context *context, void *user)
     const path_pass *pass = user;
     frame_graph_bind(context, pass->pipeline);
     gpu_push(context->commands, &pass->step, sizeof pass->step);
-    gpu_dispatch(context->commands, div_up_u32(pass->invocations, 64), 1, 1);
+    // 64 a group would be one group too many for 2048x2048 pixels.
+    gpu_dispatch(context->commands, div_up_u32(pass->invocations, 128), 1, 1);
 }
 
 static frame_graph_pass *pass_add(renderer *r, const char *name, const path_pass *pass)
