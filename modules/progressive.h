@@ -12,7 +12,7 @@
 #include "renderer.h"
 
 typedef struct progressive_status {
-    uint64_t done, total; // path: samples per pixel; vpl, ir: VPLs. After a failed frame: as before it
+    uint64_t done, total; // path: samples per pixel; vpl, ir: slots for VPLs, or frames without any
     // Estimated relative L2 error of the picture, sqrt(sum variance / sum radiance^2) over all channels of all pixels,
     // from the two halves; NAN where it is not known: below 2 samples, where the sums are no halves, not measured yet.
     double error;
