@@ -99,8 +99,8 @@ typedef struct frame_graph_pass_decl {
     uint32_t use_count;
 } frame_graph_pass_decl;
 
-// A pass that modifies an imported buffer or image is never culled; one that builds an imported acceleration structure is
-// culled when nobody traces it.
+// A pass that modifies an imported buffer or image is never culled; one that builds an imported acceleration structure
+// is culled when nobody traces it.
 typedef struct frame_graph_import_decl {
     const char *name;
     frame_graph_resource_desc desc;

@@ -255,6 +255,8 @@ static void batch_run(embree_rays *rays, uint32_t count, void (*run)(uint32_t be
     b.scene = rays->instances;
     if (!rays->failed)
         parallel_for(rays->pool, count, CHUNK, run, &b);
+    else if (b.hits) // the frame goes on, and its shaders look up what was hit
+        memset(b.hits, 0xff, count * sizeof *b.hits);
 }
 
 void embree_rays_visible(embree_rays *rays, const float (*origins)[4], const float (*directions)[4], uint32_t *visible,

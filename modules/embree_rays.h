@@ -16,8 +16,8 @@ void embree_rays_destroy(embree_rays *rays); // accepts NULL
 // move costs a comparison. Matrices are invertible. False when Embree failed (logged).
 bool embree_rays_update(embree_rays *rays, const mesh_instance_gpu *instances, uint32_t count);
 
-// Answer `count` rays, as modules/rays.h has them, on all CPUs; none once Embree has failed. The same rays get the same
-// answers every time.
+// Answer `count` rays, as modules/rays.h has them, on all CPUs. Once Embree has failed, nothing is hit and `visible` is
+// left as it is. The same rays get the same answers every time.
 void embree_rays_visible(embree_rays *rays, const float (*origins)[4], const float (*directions)[4], uint32_t *visible,
                          uint32_t count);
 void embree_rays_nearest(embree_rays *rays, const float (*origins)[4], const float (*directions)[4], ray_hit *hits,

@@ -38,9 +38,9 @@ typedef struct image_measure_info {
 } image_measure_info;
 const image_measure_info *image_measure_table(uint32_t *count);
 
-// ---- Colour maps: value in [0,1] to 8-bit sRGB.
-void color_map_sequential(float value,
-                          uint8_t rgb[3]); // dark to bright, perceptually even ("magma", as FLIP's papers use)
+// ---- Colour maps: value to 8-bit sRGB; what is outside of [0,1] counts as its nearer end, NAN as 0.
+// Dark to bright, perceptually even ("magma", as FLIP's papers use).
+void color_map_sequential(float value, uint8_t rgb[3]);
 void color_map_diverging(float value, uint8_t rgb[3]); // 0 blue, 0.5 white-ish, 1 red
 
 // The exposure in EV that puts the log-average luminance of the lit pixels at 0.18 (0 without any), and the tone-mapped

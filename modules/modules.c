@@ -6,7 +6,7 @@ bool modules_init(renderer *r)
 {
     static bool (*const inits[])(renderer *) = {
         rays_init, // traces the batches of rays that the other passes make
-        light_rays_init, // and sums up the light that those among them bring which nothing is in the way of
+        light_rays_init, // sums up the light of the shadow rays that nothing is in the way of
         acceleration_init, // top-level acceleration structure over the instances
         vpl_trace_init, // light paths, one virtual point light a bounce
         lgh_build_init, // the lighting grid hierarchy over the VPLs

@@ -10,6 +10,7 @@
 #include "modules.h"
 #include "progressive.h"
 #include "rays.h"
+#include "resource_chain.h"
 #include "world.h"
 
 #include "lanternfield_renderer_shaders.h"
@@ -72,7 +73,8 @@ static void execute(const frame_graph_context *context, void *user)
     const path_pass *pass = user;
     frame_graph_bind(context, pass->pipeline);
     gpu_push(context->commands, &pass->step, sizeof pass->step);
-    gpu_dispatch(context->commands, div_up_u32(pass->invocations, 64), 1, 1);
+    // 64 a group would be one group too many for 2048x2048 pixels.
+    gpu_dispatch(context->commands, div_up_u32(pass->invocations, 128), 1, 1);
 }
 
 static frame_graph_pass *pass_add(renderer *r, const char *name, const path_pass *pass)
@@ -127,43 +129,47 @@ static void arrive_declare(frame_graph_pass *pass, uint32_t vertex)
     frame_graph_read(pass, name_of(name, "pending", vertex), ACCESS_STORAGE_READ);
 }
 
-// The counter's name when this vertex has counted: the last one is what others read.
-static const char *counter_of(const renderer *r, resource_name name, uint32_t vertex)
+// What is handed on from vertex to vertex.
+typedef struct path_chains {
+    resource_chain counter, states;
+} path_chains;
+
+static path_chains chains_of(renderer *r, const path_step *step)
 {
-    if (vertex == bounces_of(r))
-        return "rays_path";
-    snprintf(name, sizeof(resource_name), "rays_path_after_%u", vertex);
-    return name;
+    const uint32_t vertices = 1 + bounces_of(r);
+    return (path_chains){
+        .counter = resource_chain_counter(r->graph, "path_trace/clear", "rays_path", vertices),
+        .states = {.name = "path_states",
+                   .desc = frame_graph_buffer_of(sizeof(path_state) * (uint64_t)step->count),
+                   .length = vertices},
+    };
 }
 
-static void start_declare(renderer *r, const path_trace *state, path_step step)
+static void start_declare(renderer *r, const path_trace *state, path_step step, path_chains *chains)
 {
     step.flags = flags_of(r, 0);
     const path_pass args = {state->start, step.count, step};
-    const frame_graph_resource_desc states = frame_graph_buffer_of(sizeof(path_state) * (uint64_t)step.count);
-    resource_name name;
     frame_graph_pass *pass = pass_add(r, "path_trace", &args);
     frame_graph_read(pass, "depth", ACCESS_SAMPLED);
     frame_graph_read(pass, "normals", ACCESS_SAMPLED);
-    frame_graph_create_resource(pass, name_of(name, "states", 0), &states, ACCESS_STORAGE_WRITE);
+    resource_chain_next(&chains->states, pass);
     scatter_declare(r, pass, &step);
-    frame_graph_modify(pass, "rays_path_cleared", counter_of(r, name, 0), ACCESS_STORAGE_READ_WRITE);
+    resource_chain_next(&chains->counter, pass);
     rays_declare(r, &step);
 }
 
-static void vertex_declare(renderer *r, const path_trace *state, path_step step, uint32_t vertex)
+static void vertex_declare(renderer *r, const path_trace *state, path_step step, path_chains *chains, uint32_t vertex)
 {
     step.vertex = vertex;
     step.flags = flags_of(r, vertex);
     const path_pass args = {state->vertex, step.count, step};
-    resource_name name, made;
+    resource_name name;
     snprintf(name, sizeof name, "path_trace/%u", vertex);
     frame_graph_pass *pass = pass_add(r, name, &args);
     arrive_declare(pass, vertex - 1);
-    frame_graph_modify(pass, name_of(name, "states", vertex - 1), name_of(made, "states", vertex),
-                       ACCESS_STORAGE_READ_WRITE);
+    resource_chain_next(&chains->states, pass);
     scatter_declare(r, pass, &step);
-    frame_graph_modify(pass, counter_of(r, name, vertex - 1), counter_of(r, made, vertex), ACCESS_STORAGE_READ_WRITE);
+    resource_chain_next(&chains->counter, pass);
     rays_declare(r, &step);
 }
 
@@ -172,26 +178,10 @@ static void add_declare(renderer *r, const path_trace *state, path_step step)
     const uint32_t last = bounces_of(r);
     step.flags = flags_of(r, last + 1);
     const path_pass args = {state->add, step.pixels, step};
-    resource_name name;
     frame_graph_pass *pass = pass_add(r, "path_trace/add", &args);
     arrive_declare(pass, last);
-    frame_graph_read(pass, name_of(name, "states", last), ACCESS_STORAGE_READ);
+    frame_graph_read(pass, "path_states", ACCESS_STORAGE_READ);
     frame_graph_modify(pass, "sums_before", "sums", ACCESS_STORAGE_READ_WRITE);
-}
-
-static void rays_clear(const frame_graph_context *context, void *user)
-{
-    (void)user;
-    gpu_buffer_fill(context->commands, frame_graph_buffer(context, "rays_path_cleared"), 0, 16, 0);
-}
-
-static void counter_declare(renderer *r)
-{
-    const frame_graph_pass_desc desc = {
-        .name = "path_trace/clear_rays", .kind = FRAME_GRAPH_TRANSFER, .execute = rays_clear};
-    const frame_graph_resource_desc rays = {.kind = FRAME_GRAPH_BUFFER, .size = 16, .host = true};
-    frame_graph_create_resource(frame_graph_pass_add(r->graph, &desc), "rays_path_cleared", &rays,
-                                ACCESS_TRANSFER_WRITE);
 }
 
 static void path_trace_setup(renderer *r, void *user)
@@ -216,10 +206,10 @@ static void path_trace_setup(renderer *r, void *user)
             .count = (uint32_t)count * pixels,
             .first_sample = (uint32_t)done,
         };
-        counter_declare(r);
-        start_declare(r, user, step);
+        path_chains chains = chains_of(r, &step);
+        start_declare(r, user, step, &chains);
         for (uint32_t vertex = 1; vertex <= bounces_of(r); vertex++)
-            vertex_declare(r, user, step, vertex);
+            vertex_declare(r, user, step, &chains, vertex);
         add_declare(r, user, step);
     }
     const float factor = 1 / (float)(done + count > 0 ? done + count : 1);

@@ -1,6 +1,6 @@
 // Pictures that get better from frame to frame, for the reference methods: the sums that the frames have left so far,
-// the picture made from them, how far it is, and its state in a file. A method keeps two images of light ("radiance over
-// albedo") as sums, and the picture is
+// the picture made from them, how far it is, and its state in a file. A method keeps two images of light ("radiance
+// over albedo") as sums, and the picture is
 //
 //     radiance = emission + albedo * (factor[0] * sums[0] + factor[1] * sums[1])
 //
@@ -12,7 +12,8 @@
 #include "renderer.h"
 
 typedef struct progressive_status {
-    uint64_t done, total; // path: samples per pixel; vpl, ir: VPLs. After a failed frame: as before it
+    // path: samples per pixel; vpl, ir: slots for VPLs, or frames without any. After a failed frame: as before it.
+    uint64_t done, total;
     // Estimated relative L2 error of the picture, sqrt(sum variance / sum radiance^2) over all channels of all pixels,
     // from the two halves; NAN where it is not known: below 2 samples, where the sums are no halves, not measured yet.
     double error;

@@ -91,8 +91,8 @@ static void query_execute(const frame_graph_context *context, void *user)
     const rays_pass *pass = user;
     frame_graph_bind(context, pass->pipeline);
     gpu_push(context->commands, &pass->count, sizeof pass->count);
-    // 64 a group would be one group too many for RAYS_BATCH.
-    gpu_dispatch(context->commands, div_up_u32(pass->count, 128), 1, 1);
+    // 128 a group would be one group too many for two rays at each of 2048x2048 pixels.
+    gpu_dispatch(context->commands, div_up_u32(pass->count, 256), 1, 1);
 }
 
 static void *mapping_of(const frame_graph_context *context, const char *name)

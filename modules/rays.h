@@ -10,7 +10,7 @@
 // Resources of a batch X, each of `count` items (structs in shaders/shared.h, access from shaders in rays.glsl.h):
 //   X_origins     vec4      origin, world; w: reach in metres along the direction, 1e30 for ever, <= 0: no ray
 //   X_directions  vec4      unit direction; w: unused by the tracer, free for the module
-//   X_visible     uint      RAYS_VISIBLE: 1 where nothing lies on the ray within its reach; undefined where there is no ray
+//   X_visible     uint      RAYS_VISIBLE: 1 where nothing lies on the ray within its reach; undefined without a ray
 //   X_hits        ray_hit   RAYS_NEAREST: instance RAY_MISS where nothing was hit, or there is no ray
 //
 // Both tracers respect alpha masks and see both sides of every triangle. They find the same hits but for rounding.

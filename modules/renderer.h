@@ -12,7 +12,7 @@
 // white Lambertian surface would send out, in nits, so that radiance = albedo * light):
 //
 //   tlas               acceleration  the scene, for ray queries                        acceleration
-//   vpls               vpl[vpls]                                     vpl_trace; vpl_reference where it keeps them
+//   vpls               vpl[slots]    see renderer_vpl_slots          vpl_trace; vpl_reference where it keeps them
 //   lgh_header         lgh_header                                                      lgh_build
 //   lgh_lights         grid_light[]  merged, top level first                           lgh_build
 //   lgh_sums           lgh_sums[]    the same order; with lgh_masks, lgh_ranks, lgh_vertices: see shaders/lgh.glsl.h
@@ -34,7 +34,9 @@
 //   X_u_filtered, X_s_filtered       for X = shadow, direct                            svgf
 //   X_ratio            RGBA16F       S / U in [0,1], after TAA where it is on          taa
 //   radiance           RGBA32F       nits                    composite; progressive for the other methods
-//   aov_direct, aov_indirect  RGBA32F  their parts of `radiance`, when exported         composite
+//   aov_direct, aov_indirect  RGBA32F  their parts of `radiance`, when exported, lgh alone  composite
+//   sums_before, sums  vec4[2][pixels]  the references' light before and after this frame; see progressive.h
+//   progressive_error  vec2[]        what their estimated error needs, a pair a workgroup            progressive
 //   black, white       1x1           stand in for what is absent: read min(pixel, textureSize - 1)  composite
 //   exposure           float         factor before the tone curve                      tonemap
 //   display            RGBA8         tone-mapped sRGB                                  tonemap

@@ -9,6 +9,7 @@
 #include "modules.h"
 #include "progressive.h"
 #include "rays.h"
+#include "resource_chain.h"
 
 #include "lanternfield_renderer_shaders.h"
 
@@ -132,16 +133,11 @@ typedef struct dispatch {
         float singularity;
     } push;
     uint32_t push_size;
-    char clear[NAME_SIZE]; // a counter that begins here, or empty
 } dispatch;
 
 static void dispatch_execute(const frame_graph_context *context, void *user)
 {
     const dispatch *d = user;
-    if (d->clear[0]) {
-        gpu_buffer_fill(context->commands, frame_graph_buffer(context, d->clear), 0, 16, 0);
-        gpu_memory_barrier(context->commands);
-    }
     frame_graph_bind(context, d->pipeline);
     if (d->push_size > 0)
         gpu_push(context->commands, &d->push, d->push_size);
@@ -204,13 +200,6 @@ static void unshadowed_declare(renderer *r, const vpl_reference *state, const sl
     sums_modify(pass, s, 1);
 }
 
-// The number of rays after `batches` of them.
-static const char *counter_name(char name[NAME_SIZE], const slice *s, uint32_t batches)
-{
-    snprintf(name, NAME_SIZE, "rays_shadow_%u", batches);
-    return batches == s->batches ? "rays_shadow" : name;
-}
-
 // A name that belongs to a batch.
 static const char *batch_name(char name[NAME_SIZE], uint32_t index, const char *suffix)
 {
@@ -219,30 +208,24 @@ static const char *batch_name(char name[NAME_SIZE], uint32_t index, const char *
 }
 
 // Makes a batch of rays, and counts them.
-static void rays_declare(renderer *r, const vpl_reference *state, const slice *s, uint32_t index, dispatch d)
+static void rays_declare(renderer *r, const vpl_reference *state, resource_chain *counter, uint32_t index, dispatch d)
 {
-    char from[NAME_SIZE], to[NAME_SIZE], name[NAME_SIZE];
-    const char *counted = counter_name(to, s, index + 1);
+    char name[NAME_SIZE];
     d.pipeline = state->rays;
     d.y = div_up_u32(d.push.count, LAYERS);
-    if (index == 0)
-        snprintf(d.clear, NAME_SIZE, "%s", counted);
     frame_graph_pass *pass = pass_add(r, batch_name(name, index, "/rays"), &d);
     slot_inputs_declare(pass);
     rays_create(r, pass, batch_name(name, index, ""), d.push.count * pixels_of(r));
-    const frame_graph_resource_desc counter = {.kind = FRAME_GRAPH_BUFFER, .size = 16, .host = true};
-    if (index == 0)
-        frame_graph_create_resource(pass, counted, &counter, ACCESS_STORAGE_READ_WRITE);
-    else
-        frame_graph_modify(pass, counter_name(from, s, index), counted, ACCESS_STORAGE_READ_WRITE);
+    resource_chain_next(counter, pass);
 }
 
-static void batch_declare(renderer *r, const vpl_reference *state, const slice *s, uint32_t index)
+static void batch_declare(renderer *r, const vpl_reference *state, const slice *s, resource_chain *counter,
+                          uint32_t index)
 {
     char name[NAME_SIZE];
     const uint32_t first = s->first + index * s->batch;
     const dispatch d = dispatch_of(r, state->sum, first, min_u32(s->batch, s->first + s->count - first));
-    rays_declare(r, state, s, index, d);
+    rays_declare(r, state, counter, index, d);
     rays_trace(r, batch_name(name, index, ""), RAYS_VISIBLE, d.push.count * pixels_of(r));
     frame_graph_pass *pass = pass_add(r, batch_name(name, index, "/sum"), &d);
     slot_inputs_declare(pass);
@@ -273,10 +256,15 @@ static bool size_is_possible(const renderer *r)
 static void slice_declare(renderer *r, vpl_reference *state, const slice *s)
 {
     direct_declare(r, state, s);
-    if (!is_shadowed(r) && s->batches > 0)
+    if (s->batches == 0)
+        return;
+    if (!is_shadowed(r)) {
         unshadowed_declare(r, state, s);
-    for (uint32_t i = 0; is_shadowed(r) && i < s->batches; i++)
-        batch_declare(r, state, s, i);
+        return;
+    }
+    resource_chain counter = resource_chain_counter(r->graph, "vpl_reference/clear", "rays_shadow", s->batches);
+    for (uint32_t i = 0; i < s->batches; i++)
+        batch_declare(r, state, s, &counter, i);
 }
 
 static void vpl_reference_setup(renderer *r, void *user)

@@ -131,8 +131,8 @@ static bool emitter_place(const scene_data *s, const mesh_instance_gpu *instance
     return true;
 }
 
-// Appends the triangles that give light of one primitive of the instance `index` at `emitters` and `powers`; returns how
-// many.
+// Appends the triangles that give light of one primitive of the instance `index` at `emitters` and `powers`; returns
+// how many.
 static uint32_t emitters_append(const renderer *r, uint32_t index, uint32_t geometry, emissive_triangle *emitters,
                                 float *powers)
 {
@@ -143,8 +143,7 @@ static uint32_t emitters_append(const renderer *r, uint32_t index, uint32_t geom
     float(*means)[3] = r->gpu_world->light_state->triangle_emission[primitive];
     uint32_t count = 0;
     for (uint32_t t = 0; t < p->index_count / 3; t++) {
-        emissive_triangle emitter = {
-            .textured = means != NULL, .instance = index, .geometry = geometry, .triangle = t};
+        emissive_triangle emitter = {.textured = means != NULL, .instance = index, .geometry = geometry, .triangle = t};
         uint32_t vertices[3];
         triangle_vertices(s, p, t, vertices);
         memcpy(emitter.emission, means ? means[t] : s->materials[p->material].emissive, sizeof emitter.emission);

@@ -4,7 +4,7 @@
 #extension GL_GOOGLE_include_directive : require
 #include "path_trace_arrive.glsl.h"
 
-layout(local_size_x = 64) in;
+layout(local_size_x = 128) in;
 layout(set = 0, binding = 5, scalar) readonly buffer states_block { path_state states[]; };
 layout(set = 0, binding = 6, scalar) buffer sums_block { vec4 sums[]; };
 

@@ -1,4 +1,4 @@
-// What the answers to a vertex's rays bring. Bindings 0 to 5.
+// What the answers to a vertex's rays bring. Bindings 0 to 4.
 #ifndef PATH_TRACE_ARRIVE_GLSL_H
 #define PATH_TRACE_ARRIVE_GLSL_H
 

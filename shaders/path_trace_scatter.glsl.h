@@ -8,7 +8,7 @@
 #define RAYS_BINDING (PATH_BINDING + 5)
 #include "ray_count.glsl.h"
 
-layout(local_size_x = 64) in;
+layout(local_size_x = 128) in;
 layout(set = 0, binding = PATH_BINDING, scalar) writeonly buffer pending_block { vec3 pending[]; };
 layout(set = 0, binding = PATH_BINDING + 1, scalar) writeonly buffer light_origins_block { vec4 light_origins[]; };
 layout(set = 0, binding = PATH_BINDING + 2, scalar) writeonly buffer light_directions_block { vec4 light_directions[]; };

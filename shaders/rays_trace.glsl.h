@@ -5,7 +5,7 @@
 #define TLAS_BINDING 0
 #include "ray.glsl.h"
 
-layout(local_size_x = 128) in;
+layout(local_size_x = 256) in;
 layout(set = 0, binding = 1, scalar) readonly buffer origins_block { vec4 origins[]; };
 layout(set = 0, binding = 2, scalar) readonly buffer directions_block { vec4 directions[]; };
 layout(push_constant, scalar) uniform push_block { uint count; } push;

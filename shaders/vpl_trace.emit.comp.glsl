@@ -4,6 +4,7 @@
 #define RAYS_BINDING 0
 #include "ray_count.glsl.h"
 #define RAY_ORIGINS_BINDING 1
+#include "emitters.glsl.h"
 #include "rays.glsl.h"
 #include "sobol.glsl.h"
 
@@ -67,8 +68,7 @@ light_ray directional_ray(punctual_light light, vec2 u)
 
 light_ray emitter_ray(emissive_triangle emitter, vec2 u, vec2 v)
 {
-    float root = sqrt(u.x);
-    vec2 barycentrics = vec2(root * (1.0 - u.y), root * u.y);
+    vec2 barycentrics = triangle_point(u);
     vec3 normal = emitter.normal;
     float sides = 1.0;
     if (emitter.two_sided != 0u) {

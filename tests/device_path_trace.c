@@ -690,6 +690,20 @@ TEST(scene_without_light_is_black_at_once)
     renderer_destroy(r);
 }
 
+// Two light kinds make more rays than any other picture has; the validation layer would tell of too large dispatches.
+TEST(the_largest_picture_is_possible)
+{
+    static quad_scene s;
+    lamp_init(&s, 1, 0.5f, 0.5f, 0);
+    renderer *r = renderer_of(&s.data, 2048);
+    light_add(r, LIGHT_POINT, (float[3]){0.1f, 1.5f, 0.2f}, 10);
+    r->settings.rays = RAYS_QUERY;
+    r->settings.only = ONLY_DIRECT;
+    CHECK(renderer_frame(r));
+    CHECK(progressive_status_get(r, false).done == 1);
+    renderer_destroy(r);
+}
+
 TEST(validation_layer_is_silent)
 {
     CHECK(gpu_validation_messages(device) == 0);
@@ -721,6 +735,7 @@ int main(void)
     RUN(two_runs_give_the_same_bytes);
     RUN(picture_begins_anew_when_what_it_shows_changes);
     RUN(scene_without_light_is_black_at_once);
+    RUN(the_largest_picture_is_possible);
     RUN(validation_layer_is_silent);
     gpu_destroy(device);
     return scene_test_end();
