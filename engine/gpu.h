@@ -92,6 +92,7 @@ VkMemoryRequirements gpu_image_requirements(gpu *gpu, const gpu_image_desc *desc
 gpu_memory gpu_memory_create(gpu *gpu, const VkMemoryRequirements *requirements);
 void gpu_memory_destroy(gpu *gpu, gpu_memory memory);
 
+VkDeviceSize gpu_storage_buffer_max(const gpu *gpu); // bytes that one binding can hold
 VkDeviceSize gpu_memory_used(const gpu *gpu); // bytes allocated now
 VkDeviceSize gpu_memory_peak(const gpu *gpu); // the most that was allocated at once, since creation or the last reset
 // The peak starts anew from what is allocated now. Counted is device memory that this layer allocates: resources,

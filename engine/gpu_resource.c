@@ -173,6 +173,11 @@ void gpu_memory_destroy(gpu *gpu, gpu_memory memory)
     gpu_pool_remove(&gpu->memories, memory.id);
 }
 
+VkDeviceSize gpu_storage_buffer_max(const gpu *gpu)
+{
+    return gpu->properties.limits.maxStorageBufferRange;
+}
+
 VkDeviceSize gpu_memory_used(const gpu *gpu)
 {
     return gpu->memory_used;

@@ -271,7 +271,6 @@ static bool distribution_write(renderer *r)
         total += state->emitter_powers[i];
     w->light_power = (float)total;
     const double scale = total > 0 ? total : 1;
-    emissive_triangle *triangles = gpu_buffer_map(r->gpu, w->emitters);
     double sum = 0; // added in the same order as `total`, so that the last is 1
     for (uint32_t i = 0; i < lights; i++) {
         sum += state->light_powers[i];
@@ -280,7 +279,6 @@ static bool distribution_write(renderer *r)
     for (uint32_t i = 0; i < emitters; i++) {
         sum += state->emitter_powers[i];
         cdf[lights + i] = (float)(sum / scale);
-        triangles[i].probability = (float)(state->emitter_powers[i] / scale);
     }
     return true;
 }

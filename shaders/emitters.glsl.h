@@ -10,10 +10,14 @@ const float EMITTER_SHARE_MIN = 0.01;
 // The emissive triangles' part of the light sources' distribution; the punctual lights come first in it.
 float emitter_share() { return 1.0 - (frame.light_count > 0u ? light_cdf[frame.light_count - 1u] : 0.0); }
 
+// By the sums themselves, so that it is exactly how often emitter_at chooses the triangle.
 float emitter_probability(uint triangle, float share)
 {
-    return share < EMITTER_SHARE_MIN ? 1.0 / float(frame.emitter_count)
-                                     : max(emitters[triangle].probability / share, 1e-30);
+    if (share < EMITTER_SHARE_MIN)
+        return 1.0 / float(frame.emitter_count);
+    uint source = frame.light_count + triangle;
+    float difference = light_cdf[source] - (source > 0u ? light_cdf[source - 1u] : 0.0);
+    return max(difference, 1.0 / 16777216.0) / share; // no less than a step of the random numbers
 }
 
 // Chooses an emissive triangle by u in [0,1): by power, or uniformly where so little of the distribution is theirs (beside

@@ -130,14 +130,13 @@ SHARED_STRUCT(emissive_triangle) {
     SHARED_VEC3(normal); // unit, geometric front side
     uint textured;       // 1: emission varies over the triangle
     SHARED_VEC3(emission); // nits, mean over the triangle
-    float probability;   // of choosing this triangle among all light sources, in proportion to power
+    uint instance; // where a ray hits it, as ray_hit has it; the array is sorted by these three
     SHARED_VEC2(uv0);    // for the emissive texture, transform applied
     SHARED_VEC2(uv1);
     SHARED_VEC2(uv2);
-    uint instance;  // where a ray hits it, as ray_hit has it; the array is sorted by these three
     uint geometry;
     uint triangle;
-} SHARED_END(emissive_triangle, 116)
+} SHARED_END(emissive_triangle, 112)
 
 // ---- Rays
 

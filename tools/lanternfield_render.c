@@ -130,6 +130,18 @@ static double memory_needed(const render_settings *settings)
     return 0;
 }
 
+// Whether a buffer takes what each pixel keeps in it: a ray's origin, or of the other methods the two sums.
+static bool size_check(const gpu *gpu, const render_settings *settings)
+{
+    const uint64_t pixels = (uint64_t)settings->width * settings->height;
+    const uint64_t most = gpu_storage_buffer_max(gpu) / (settings->method == METHOD_LGH ? 16 : 32);
+    if (pixels > most) {
+        log_error("--size %ux%u: expected at most %llu pixels, which is what the buffers of %s hold", settings->width,
+                  settings->height, (unsigned long long)most, gpu_name(gpu));
+    }
+    return pixels <= most;
+}
+
 // A device that is the CPU takes what it likes until the system ends the process, so what a picture needs at least is
 // compared with what there is; other devices refuse an allocation by themselves.
 static bool memory_check(const gpu *gpu, const render_settings *settings)
@@ -424,7 +436,8 @@ bool render_session_open(render_session *session, const render_request *request)
     }
     const gpu_desc desc = {.device = request->device, .validation = request->validate};
     session->gpu = gpu_create(&desc);
-    if (!session->gpu || !memory_check(session->gpu, &request->settings)) {
+    if (!session->gpu || !size_check(session->gpu, &request->settings) ||
+        !memory_check(session->gpu, &request->settings)) {
         return false;
     }
     progress_show("upload %s", request->scene);
