@@ -1,9 +1,5 @@
 // The lighting grid hierarchy against what it promises: conservation of flux, agreement of its construction methods,
 // the brute-force sum over the same VPLs, the reservoirs' probabilities, and identical bytes.
-//
-//     device_lgh                                the tests
-//     device_lgh table SCENE [CAMERA [VPLS]]    error, energy and lights per pixel of every emission model, 320x180
-//     device_lgh shadows SCENE [CAMERA [VPLS]]  error and energy of the end points with shadows, 96x54
 #include "quad_scene.h"
 #include "test.h"
 
@@ -184,14 +180,14 @@ static void hierarchy_free(hierarchy *h)
 }
 
 typedef struct comparison {
-    double error, energy, lights; // relative L2, energy ratio, lights per pixel with geometry
+    double error, energy; // relative L2, energy ratio
 } comparison;
 
 // The sum over every VPL at each pixel; free() it. It depends on the scene and the VPLs alone.
-static float *brute_force_render(renderer *r, const gpu_shader *shader)
+static float *brute_force_render(renderer *r)
 {
     brute_force *pass = renderer_pass_add(r, "brute_force", sizeof *pass, brute_force_setup, pipeline_fini);
-    pass->pipeline = gpu_compute_pipeline_create(device, &(gpu_compute_pipeline_desc){.shader = shader});
+    pass->pipeline = gpu_compute_pipeline_create(device, &(gpu_compute_pipeline_desc){.shader = &shader_brute_force_comp});
     export_names(r, (const char *const[]){"brute_force"}, 1);
     CHECK(renderer_frame(r));
     ecs_remove(r->world, renderer_pass_find(r, "brute_force"), r->pass);
@@ -200,13 +196,10 @@ static float *brute_force_render(renderer *r, const gpu_shader *shader)
 
 static comparison compare_with_brute_force(renderer *r, const float *reference)
 {
-    static const char *const names[] = {"indirect", "lights_per_pixel"};
-    export_names(r, names, r->count_lights ? 2 : 1);
+    export_names(r, (const char *const[]){"indirect"}, 1);
     CHECK(renderer_frame(r));
     float *image = read_image(r, "indirect");
-    float *count = r->count_lights ? read_image(r, "lights_per_pixel") : NULL;
-    double difference = 0, square = 0, sum = 0, reference_sum = 0, lights = 0;
-    size_t lit = 0;
+    double difference = 0, square = 0, sum = 0, reference_sum = 0;
     const size_t pixels = (size_t)r->settings.width * r->settings.height;
     for (size_t i = 0; i < pixels; i++) {
         for (int c = 0; c < 3; c++) {
@@ -216,12 +209,9 @@ static comparison compare_with_brute_force(renderer *r, const float *reference)
             sum += a;
             reference_sum += b;
         }
-        lights += count ? count[i] : 0;
-        lit += count && count[i] > 0;
     }
     free(image);
-    free(count);
-    return (comparison){sqrt(difference / square), sum / reference_sum, lit ? lights / (double)lit : 0};
+    return (comparison){sqrt(difference / square), sum / reference_sum};
 }
 
 // ---- Tests
@@ -408,7 +398,7 @@ static void check_error_falls(const char *scene)
     s.only = ONLY_INDIRECT_UNSHADOWED;
     s.emission = EMISSION_AB;
     fixture f = fixture_create(scene, NULL, &s);
-    float *reference = brute_force_render(f.r, &shader_brute_force_comp);
+    float *reference = brute_force_render(f.r);
     double errors[5] = {1e9};
     for (uint32_t alpha = 1; alpha <= 4; alpha *= 2) {
         f.r->settings.alpha = (float)alpha;
@@ -478,7 +468,7 @@ TEST(start_level_0_and_a_wide_alpha_give_the_brute_force_sum)
     s.alpha = 16;
     s.levels = 2;
     fixture f = fixture_create(SCENES "cornell.glb", NULL, &s);
-    float *reference = brute_force_render(f.r, &shader_brute_force_comp);
+    float *reference = brute_force_render(f.r);
     const comparison c = compare_with_brute_force(f.r, reference);
     printf("  relative L2 %.2e, energy %.6f\n", c.error, c.energy);
     CHECK(c.error < 1e-4); // every pixel lies within r_0 of every VPL
@@ -650,99 +640,13 @@ TEST(the_validation_layer_has_nothing_to_say)
     CHECK(gpu_validation_messages(device) == 0);
 }
 
-// ---- The table
-
-static int print_table(const char *path, const char *camera, uint32_t vpls)
+int main(void)
 {
-    static const char *const names[] = {"demo", "mean-normal", "A", "B", "AB"};
-    render_settings s = small_settings(320, 180, vpls);
-    s.only = ONLY_INDIRECT_UNSHADOWED;
-    fixture f = fixture_create(path, camera, &s);
-    f.r->count_lights = true;
-    float *reference = brute_force_render(f.r, &shader_brute_force_comp);
-    printf("| %s, %u slots | alpha 1 | alpha 2 | alpha 4 |\n|---|---|---|---|\n", path, vpls);
-    double lights[3];
-    for (uint32_t model = 0; model < countof(names); model++) {
-        printf("| %s |", names[model]);
-        for (uint32_t a = 0; a < 3; a++) {
-            f.r->settings.emission = model;
-            f.r->settings.alpha = (float)(1u << a);
-            const comparison c = compare_with_brute_force(f.r, reference);
-            printf(" %.4f / %.3f |", c.error, c.energy);
-            fflush(stdout);
-            lights[a] = c.lights;
-        }
-        printf("\n");
-    }
-    printf("| lights per pixel | %.0f | %.0f | %.0f |\n", lights[0], lights[1], lights[2]);
-    free(reference);
-    fixture_destroy(&f);
-    return test_end();
-}
-
-// Shadowed indirect light, unshadowed times ratio, against brute force with a ray to each VPL.
-static comparison compare_shadows(renderer *r, const float *reference, uint32_t frames)
-{
-    export_names(r, (const char *const[]){"radiance", "albedo"}, 2);
-    frame_graph_history_drop(r->graph); // of other settings
-    for (uint32_t i = 0; i < frames; i++)
-        CHECK(renderer_frame(r));
-    float *image = read_image(r, "radiance");
-    uint16_t *albedo = (uint16_t *)read_image(r, "albedo");
-    double difference = 0, square = 0, sum = 0, reference_sum = 0;
-    for (size_t i = 0; i < (size_t)r->settings.width * r->settings.height; i++)
-        for (int c = 0; c < 3; c++) {
-            const double a = image[4 * i + c], b = reference[4 * i + c] * albedo[4 * i + c] / 65535.0;
-            difference += (a - b) * (a - b);
-            square += b * b;
-            sum += a;
-            reference_sum += b;
-        }
-    free(image);
-    free(albedo);
-    return (comparison){sqrt(difference / square), sum / reference_sum, 0};
-}
-
-static int print_shadows(const char *path, const char *camera, uint32_t vpls)
-{
-    static const char *const names[] = {"centre", "jitter", "vpl"};
-    render_settings s = small_settings(96, 54, vpls);
-    s.only = ONLY_INDIRECT;
-    fixture f = fixture_create(path, camera, &s);
-    float *reference = brute_force_render(f.r, &shader_brute_force_shadowed_comp);
-    printf(
-        "| %s, %u slots | alpha 1, k 1 | alpha 1, k 4 | alpha 2, k 4 | alpha 2, k 4, S1 too |\n|---|---|---|---|---|\n",
-        path, vpls);
-    for (uint32_t end = 0; end < countof(names); end++) {
-        printf("| %s |", names[end]);
-        for (uint32_t i = 0; i < 4; i++) {
-            f.r->settings.end_point = end;
-            f.r->settings.alpha = i < 2 ? 1 : 2;
-            f.r->settings.shadow_samples = i == 0 ? 1 : 4;
-            f.r->settings.sample_s1 = i == 3;
-            const comparison c = compare_shadows(f.r, reference, 8);
-            printf(" %.3f / %.3f |", c.error, c.energy);
-            fflush(stdout);
-        }
-        printf("\n");
-    }
-    free(reference);
-    fixture_destroy(&f);
-    return test_end();
-}
-
-int main(int argc, char **argv)
-{
-    const bool table = argc >= 3 && strcmp(argv[1], "table") == 0,
-               shadows = argc >= 3 && strcmp(argv[1], "shadows") == 0;
-    device = gpu_create(&(gpu_desc){.validation = !table && !shadows});
+    device = gpu_create(&(gpu_desc){.validation = true});
     if (!device) {
         printf("skipped: no usable device\n");
         return 77;
     }
-    if (table || shadows)
-        return (table ? print_table : print_shadows)(argv[2], argc > 3 ? argv[3] : NULL,
-                                                     argc > 4 ? (uint32_t)atoi(argv[4]) : 100000);
     RUN(blending_functions_sum_to_one);
     RUN(every_level_carries_the_flux_of_the_vpls);
     RUN(other_ways_to_build_carry_the_flux_too);
