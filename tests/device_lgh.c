@@ -1,5 +1,6 @@
 // The lighting grid hierarchy against what it promises: conservation of flux, agreement of its construction methods,
 // the brute-force sum over the same VPLs, the reservoirs' probabilities, and identical bytes.
+#include "brute_force.h"
 #include "quad_scene.h"
 #include "test.h"
 
@@ -12,56 +13,12 @@
 
 static gpu *device;
 
-// ---- A pass of our own: the sum over every VPL
-
-typedef struct brute_force {
-    gpu_pipeline pipeline;
-    uint32_t width, height;
-    struct {
-        uint32_t slot_count;
-        float singularity;
-    } push;
-} brute_force;
-
-static void brute_force_execute(const frame_graph_context *context, void *user)
-{
-    const brute_force *pass = user;
-    frame_graph_bind(context, pass->pipeline);
-    gpu_push(context->commands, &pass->push, sizeof pass->push);
-    gpu_dispatch(context->commands, div_up_u32(pass->width, 8), div_up_u32(pass->height, 8), 1);
-}
-
-static void brute_force_setup(renderer *r, void *state)
-{
-    brute_force *pass = state;
-    pass->width = r->settings.width;
-    pass->height = r->settings.height;
-    pass->push.slot_count = r->settings.vpls;
-    pass->push.singularity = renderer_singularity(r);
-    frame_graph_pass *p = frame_graph_pass_add(r->graph, &(frame_graph_pass_desc){.name = "brute_force",
-                                                                                  .kind = FRAME_GRAPH_COMPUTE,
-                                                                                  .execute = brute_force_execute,
-                                                                                  .user = pass});
-    const frame_graph_resource_desc image =
-        frame_graph_image_of(VK_FORMAT_R32G32B32A32_SFLOAT, pass->width, pass->height);
-    frame_graph_read(p, "vpls", ACCESS_STORAGE_READ);
-    frame_graph_read(p, "depth", ACCESS_SAMPLED);
-    frame_graph_read(p, "normals", ACCESS_SAMPLED);
-    frame_graph_create_resource(p, "brute_force", &image, ACCESS_STORAGE_WRITE);
-    frame_graph_read(p, "tlas", ACCESS_TRACE);
-}
-
-static void pipeline_fini(renderer *r, void *state)
-{
-    gpu_pipeline_destroy(r->gpu, ((brute_force *)state)->pipeline);
-}
-
 // ---- A pass of our own: every light's sampling weight at every pixel
 
 enum { SELECTION_LIGHTS = 64 };
 
 typedef struct selection {
-    gpu_pipeline pipeline; // first, as pipeline_fini expects
+    gpu_pipeline pipeline;
     uint32_t pixels;
     struct {
         uint32_t light_capacity, emission;
@@ -93,6 +50,11 @@ static void selection_setup(renderer *r, void *state)
     frame_graph_read(p, "depth", ACCESS_SAMPLED);
     frame_graph_read(p, "normals", ACCESS_SAMPLED);
     frame_graph_create_resource(p, "selection_weights", &weights, ACCESS_STORAGE_WRITE);
+}
+
+static void selection_fini(renderer *r, void *state)
+{
+    gpu_pipeline_destroy(r->gpu, ((selection *)state)->pipeline);
 }
 
 // ---- Helpers
@@ -186,8 +148,7 @@ typedef struct comparison {
 // The sum over every VPL at each pixel; free() it. It depends on the scene and the VPLs alone.
 static float *brute_force_render(renderer *r)
 {
-    brute_force *pass = renderer_pass_add(r, "brute_force", sizeof *pass, brute_force_setup, pipeline_fini);
-    pass->pipeline = gpu_compute_pipeline_create(device, &(gpu_compute_pipeline_desc){.shader = &shader_brute_force_comp});
+    brute_force_add(r, &shader_brute_force_comp);
     export_names(r, (const char *const[]){"brute_force"}, 1);
     CHECK(renderer_frame(r));
     ecs_remove(r->world, renderer_pass_find(r, "brute_force"), r->pass);
@@ -505,7 +466,7 @@ TEST(exact_reservoirs_pick_light_i_with_probability_f_i)
     s.shadow_samples = SAMPLES;
     s.sample_s1 = true;
     fixture f = fixture_create(SCENES "cornell.glb", NULL, &s);
-    selection *pass = renderer_pass_add(f.r, "selection", sizeof *pass, selection_setup, pipeline_fini);
+    selection *pass = renderer_pass_add(f.r, "selection", sizeof *pass, selection_setup, selection_fini);
     pass->pipeline =
         gpu_compute_pipeline_create(device, &(gpu_compute_pipeline_desc){.shader = &shader_selection_comp});
     export_names(f.r, (const char *const[]){"selection_weights", "reservoirs", "lgh_header"}, 3);

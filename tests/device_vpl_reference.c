@@ -3,6 +3,7 @@
 //
 //     device_vpl_reference               the tests
 //     device_vpl_reference bias [VPLS]   error against path tracing by the singularity b, cornell, 64x64
+#include "brute_force.h"
 #include "test.h"
 
 #include "modules/progressive.h"
@@ -279,48 +280,6 @@ TEST(no_shadow_samples_means_no_shadows)
     free(shadowed);
 }
 
-// A pass of our own: the shadowed sum in one shader, ray query inline.
-typedef struct brute_force {
-    gpu_pipeline pipeline;
-    uint32_t width, height;
-    struct {
-        uint32_t slot_count;
-        float singularity;
-    } push;
-} brute_force;
-
-static void brute_force_execute(const frame_graph_context *context, void *user)
-{
-    const brute_force *pass = user;
-    frame_graph_bind(context, pass->pipeline);
-    gpu_push(context->commands, &pass->push, sizeof pass->push);
-    gpu_dispatch(context->commands, div_up_u32(pass->width, 8), div_up_u32(pass->height, 8), 1);
-}
-
-static void brute_force_setup(renderer *r, void *state)
-{
-    brute_force *pass = state;
-    const frame_graph_pass_desc desc = {
-        .name = "brute_force", .kind = FRAME_GRAPH_COMPUTE, .execute = brute_force_execute, .user = pass};
-    const frame_graph_resource_desc image =
-        frame_graph_image_of(VK_FORMAT_R32G32B32A32_SFLOAT, r->settings.width, r->settings.height);
-    pass->width = r->settings.width;
-    pass->height = r->settings.height;
-    pass->push.slot_count = renderer_vpl_slots(r);
-    pass->push.singularity = renderer_singularity(r);
-    frame_graph_pass *p = frame_graph_pass_add(r->graph, &desc);
-    frame_graph_read(p, "vpls", ACCESS_STORAGE_READ);
-    frame_graph_read(p, "depth", ACCESS_SAMPLED);
-    frame_graph_read(p, "normals", ACCESS_SAMPLED);
-    frame_graph_create_resource(p, "brute_force", &image, ACCESS_STORAGE_WRITE);
-    frame_graph_read(p, "tlas", ACCESS_TRACE);
-}
-
-static void brute_force_fini(renderer *r, void *state)
-{
-    gpu_pipeline_destroy(r->gpu, ((brute_force *)state)->pipeline);
-}
-
 // Not square, so that no pixel's centre lies on an edge of the box, where it depends on rounding what is visible.
 static void check_one_shader(uint32_t rays)
 {
@@ -329,9 +288,7 @@ static void check_one_shader(uint32_t rays)
     s.rays = rays;
     fixture f = fixture_create(SCENES "cornell.glb", NULL, &s);
     exports_set(f.r, (const char *const[]){"brute_force", "albedo"}, 2);
-    brute_force *pass = renderer_pass_add(f.r, "brute_force", sizeof *pass, brute_force_setup, brute_force_fini);
-    pass->pipeline =
-        gpu_compute_pipeline_create(device, &(gpu_compute_pipeline_desc){.shader = &shader_brute_force_shadowed_comp});
+    brute_force_add(f.r, &shader_brute_force_shadowed_comp);
     finish(f.r);
     float *expected = image_read(f.r, "brute_force"), *radiance = radiance_read(f.r);
     uint16_t(*albedo)[4] = image_read(f.r, "albedo");
