@@ -42,7 +42,7 @@ static rays_state *state_of(const renderer *r)
 bool rays_are_host(const renderer *r)
 {
     const bool possible = gpu_is_cpu(r->gpu) && !state_of(r)->no_embree;
-    return possible && r->settings.rays != RAYS_QUERY;
+    return possible && (r->settings.rays == RAYS_AUTO || r->settings.rays == RAYS_EMBREE);
 }
 
 // ---- Batches

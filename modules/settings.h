@@ -5,8 +5,10 @@
 #include "engine/base.h"
 
 typedef enum render_method { METHOD_LGH, METHOD_PATH, METHOD_VPL, METHOD_IR } render_method;
-typedef enum ray_method { RAYS_AUTO, RAYS_QUERY, RAYS_EMBREE } ray_method;
+typedef enum ray_method { RAYS_AUTO, RAYS_QUERY, RAYS_PIPELINE, RAYS_EMBREE } ray_method;
 typedef enum render_only { ONLY_ALL, ONLY_DIRECT, ONLY_INDIRECT, ONLY_INDIRECT_UNSHADOWED } render_only;
+typedef enum lighting_method { LIGHTING_GATHER, LIGHTING_VOLUMES } lighting_method;
+typedef enum grid_method { GRID_WORLD, GRID_BOUNDS } grid_method;
 typedef enum lgh_build_method { LGH_BUILD_RESTRICT, LGH_BUILD_GATHER, LGH_BUILD_SCATTER } lgh_build_method;
 typedef enum lgh_s1_method { LGH_S1_ORDERED, LGH_S1_ATOMIC } lgh_s1_method;
 typedef enum end_point { END_POINT_CENTRE, END_POINT_JITTER, END_POINT_VPL } end_point;
@@ -17,16 +19,21 @@ typedef struct render_settings {
     uint32_t width, height; // pixels
     uint32_t method;
     uint32_t rays; // who traces them; RAYS_AUTO: Embree where the Vulkan device is a CPU
+    bool ray_order; // rays are compacted and ordered before a GPU traces them
+    float ray_budget; // indirect shadow rays per pixel on average, at most shadow_samples; 0: shadow_samples everywhere
     uint32_t vpls; // slots, 0 to 2,500,000
     uint32_t bounces; // indirect bounces, 1 to 8
     float alpha; // r_l = alpha * h_l; > 0
     uint32_t levels; // 0: automatic
+    uint32_t grid; // where the hierarchy's grid lies
+    uint32_t lighting; // who adds up the grid lights at a pixel
     uint32_t shadow_samples; // reservoirs and shadow rays per pixel, 0 to 8; 0: no indirect shadows
     uint32_t interleave; // 1, 2 or 4
     uint32_t emission; // EMISSION_*
     uint32_t end_point;
     uint32_t build;
     uint32_t s1;
+    bool incremental; // what did not change since the last frame is not traced and built again
     uint32_t reservoirs;
     uint32_t sampling;
     uint32_t start_level; // 0: the VPLs themselves are the lowest level; 1
@@ -38,6 +45,8 @@ typedef struct render_settings {
     uint32_t seed;
     bool auto_exposure;
     float exposure; // EV, when not automatic
+    float target_ms; // automatic settings: frame time in milliseconds; 0: none
+    float target_error; // automatic settings: relative L2 error; 0: none. Not both
     uint32_t frames; // rendered; the last is written. The progressive methods (path, vpl) take as many as they need
     uint32_t spp; // path: samples per pixel at most
     float until; // path: stops at this estimated relative error; 0: never

@@ -4,6 +4,7 @@
 #include "rays.h"
 #include "resource_chain.h"
 #include "vpl_reference.h"
+#include "vpl_trace.h"
 
 #include "lanternfield_renderer_shaders.h"
 
@@ -73,6 +74,12 @@ static void bounce_declare(renderer *r, const vpl_trace *state, vpl_chains *chai
     resource_chain_next(&chains->flux, pass);
     resource_chain_next(&chains->vpls, pass);
     frame_graph_read(pass, hits, ACCESS_STORAGE_READ);
+}
+
+vpl_change vpl_trace_change(const renderer *r)
+{
+    (void)r;
+    return VPLS_ALL;
 }
 
 static void vpl_trace_setup(renderer *r, void *state)

@@ -118,7 +118,7 @@ TEST(the_references_have_limits_of_their_own)
     CHECK(malformed("method", "lgh,path") && malformed("method", "LGH"));
     CHECK_STRING(error.message, "--method: expected one of lgh, path, vpl, ir, got \"LGH\"");
     CHECK(malformed("rays", "cpu"));
-    CHECK_STRING(error.message, "--rays: expected one of auto, query, embree, got \"cpu\"");
+    CHECK_STRING(error.message, "--rays: expected one of auto, query, pipeline, embree, got \"cpu\"");
     CHECK(set("method", "ir") && settings.method == METHOD_IR && set("rays", "embree") &&
           settings.rays == RAYS_EMBREE);
 }
