@@ -221,6 +221,17 @@ void gpu_dispatch_indirect(gpu_commands *commands, gpu_buffer buffer, VkDeviceSi
     vkCmdDispatchIndirect(commands->handle, gpu_buffer_handle(commands->gpu, buffer), offset);
 }
 
+void gpu_trace_rays(gpu_commands *commands, uint32_t count)
+{
+    const gpu *gpu = commands->gpu;
+    const gpu_pipeline_object *pipeline = gpu_pool_get(&gpu->pipelines, commands->pipeline.id);
+    static const VkStridedDeviceAddressRegionKHR no_callables;
+    assert(pipeline->bind_point == VK_PIPELINE_BIND_POINT_RAY_TRACING_KHR);
+    if (count)
+        gpu->vkCmdTraceRaysKHR(commands->handle, &pipeline->raygen, &pipeline->miss, &pipeline->hit, &no_callables,
+                               count, 1, 1);
+}
+
 void gpu_draw(gpu_commands *commands, uint32_t vertices, uint32_t instances, uint32_t first_instance)
 {
     vkCmdDraw(commands->handle, vertices, instances, 0, first_instance);
