@@ -38,6 +38,7 @@ static const required_feature required_features[] = {
     FEATURE(core.features, depthClamp),
     FEATURE(core.features, independentBlend),
     FEATURE(core.features, drawIndirectFirstInstance),
+    FEATURE(core.features, shaderSampledImageArrayDynamicIndexing),
     FEATURE(core.features, shaderStorageImageReadWithoutFormat),
     FEATURE(core.features, shaderStorageImageWriteWithoutFormat),
     FEATURE(vulkan12, bufferDeviceAddress),

@@ -189,6 +189,9 @@ void gpu_dispatch_indirect(gpu_commands *commands, gpu_buffer buffer, VkDeviceSi
 // The ray generation shader of the ray pipeline that was bound last, once for each index below `count`; zero: nothing.
 void gpu_trace_rays(gpu_commands *commands, uint32_t count);
 void gpu_draw(gpu_commands *commands, uint32_t vertices, uint32_t instances, uint32_t first_instance);
+// The same with gl_VertexIndex = indices[first_index + i], i < count, from a buffer of uint32_t with the usage
+// INDEX_BUFFER; equal indices may share what the vertex shader makes.
+void gpu_draw_indexed(gpu_commands *commands, gpu_buffer indices, uint32_t first_index, uint32_t count);
 void gpu_draw_indirect(gpu_commands *commands, gpu_buffer buffer, VkDeviceSize offset); // one VkDrawIndirectCommand
 void gpu_viewport_set(gpu_commands *commands, float x, float y, float width, float height); // scissor too
 void gpu_cull_set(gpu_commands *commands, VkCullModeFlags cull);

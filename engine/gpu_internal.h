@@ -80,6 +80,7 @@ struct gpu_commands {
     VkCommandBuffer handle;
     VkFence fence;
     gpu_pipeline pipeline; // bound last
+    gpu_buffer indices; // bound last
     gpu_commands *next; // in the list of free ones
 };
 
