@@ -1028,15 +1028,15 @@ static void attachment_operations_derive(compiler *c)
 // ---- Barriers
 
 #define GRAPHICS_SHADERS (VK_PIPELINE_STAGE_2_VERTEX_SHADER_BIT | VK_PIPELINE_STAGE_2_FRAGMENT_SHADER_BIT)
-// Before and after the frame nothing tells which shaders.
+// Before and after the frame nothing tells which shaders. Not those of ray-tracing pipelines, whose stage may be named
+// only where the device has them: frames are waited for, so that none of theirs is still running.
 #define ANY_SHADER (GRAPHICS_SHADERS | VK_PIPELINE_STAGE_2_COMPUTE_SHADER_BIT)
 
-// There are no ray tracing pipelines: rays are traced by ray queries in compute shaders.
 static const VkPipelineStageFlags2 SHADER_STAGES[] = {
     [FRAME_GRAPH_GRAPHICS] = GRAPHICS_SHADERS,
     [FRAME_GRAPH_COMPUTE] = VK_PIPELINE_STAGE_2_COMPUTE_SHADER_BIT,
     [FRAME_GRAPH_TRANSFER] = 0,
-    [FRAME_GRAPH_RAY_TRACING] = VK_PIPELINE_STAGE_2_COMPUTE_SHADER_BIT,
+    [FRAME_GRAPH_RAY_TRACING] = VK_PIPELINE_STAGE_2_RAY_TRACING_SHADER_BIT_KHR,
     [FRAME_GRAPH_HOST] = 0,
 };
 

@@ -52,7 +52,7 @@ typedef enum frame_graph_pass_kind {
     FRAME_GRAPH_GRAPHICS,
     FRAME_GRAPH_COMPUTE,
     FRAME_GRAPH_TRANSFER,
-    FRAME_GRAPH_RAY_TRACING, // ray queries in compute shaders
+    FRAME_GRAPH_RAY_TRACING, // ray-tracing pipelines; ray queries are made by COMPUTE and GRAPHICS passes
     FRAME_GRAPH_HOST, // a CPU callback between two submits
 } frame_graph_pass_kind;
 

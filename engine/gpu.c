@@ -7,7 +7,6 @@
 
 static const char *const required_extensions[] = {
     VK_KHR_ACCELERATION_STRUCTURE_EXTENSION_NAME,
-    VK_KHR_RAY_QUERY_EXTENSION_NAME,
     VK_KHR_PUSH_DESCRIPTOR_EXTENSION_NAME,
     VK_KHR_DEFERRED_HOST_OPERATIONS_EXTENSION_NAME,
 };
@@ -19,6 +18,7 @@ typedef struct device_features {
     VkPhysicalDeviceVulkan13Features vulkan13;
     VkPhysicalDeviceAccelerationStructureFeaturesKHR acceleration;
     VkPhysicalDeviceRayQueryFeaturesKHR ray_query;
+    VkPhysicalDeviceRayTracingPipelineFeaturesKHR ray_pipeline;
     VkPhysicalDeviceShaderAtomicFloatFeaturesEXT atomic_float;
 } device_features;
 
@@ -38,6 +38,7 @@ static const required_feature required_features[] = {
     FEATURE(core.features, depthClamp),
     FEATURE(core.features, independentBlend),
     FEATURE(core.features, drawIndirectFirstInstance),
+    FEATURE(core.features, shaderSampledImageArrayDynamicIndexing),
     FEATURE(core.features, shaderStorageImageReadWithoutFormat),
     FEATURE(core.features, shaderStorageImageWriteWithoutFormat),
     FEATURE(vulkan12, bufferDeviceAddress),
@@ -51,7 +52,6 @@ static const required_feature required_features[] = {
     FEATURE(vulkan13, synchronization2),
     FEATURE(vulkan13, maintenance4),
     FEATURE(acceleration, accelerationStructure),
-    FEATURE(ray_query, rayQuery),
 };
 
 static const char *result_name(VkResult result)
@@ -229,6 +229,7 @@ static void device_features_chain(VkPhysicalDevice device, device_features *feat
         .vulkan13.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_3_FEATURES,
         .acceleration.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_ACCELERATION_STRUCTURE_FEATURES_KHR,
         .ray_query.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_RAY_QUERY_FEATURES_KHR,
+        .ray_pipeline.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_RAY_TRACING_PIPELINE_FEATURES_KHR,
         .atomic_float.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_SHADER_ATOMIC_FLOAT_FEATURES_EXT,
     };
     features->core.pNext = &features->vulkan12;
@@ -241,6 +242,7 @@ static void device_features_chain(VkPhysicalDevice device, device_features *feat
     } optional[] = {
         {VK_KHR_ACCELERATION_STRUCTURE_EXTENSION_NAME, &features->acceleration, &features->acceleration.pNext},
         {VK_KHR_RAY_QUERY_EXTENSION_NAME, &features->ray_query, &features->ray_query.pNext},
+        {VK_KHR_RAY_TRACING_PIPELINE_EXTENSION_NAME, &features->ray_pipeline, &features->ray_pipeline.pNext},
         {VK_EXT_SHADER_ATOMIC_FLOAT_EXTENSION_NAME, &features->atomic_float, &features->atomic_float.pNext},
     };
     for (size_t i = 0; i < countof(optional); i++) {
@@ -299,8 +301,18 @@ static uint32_t device_max_push_descriptors(VkPhysicalDevice device)
     return push.maxPushDescriptors;
 }
 
+static bool has_ray_query(const device_features *supported, const gpu_desc *desc)
+{
+    return supported->ray_query.rayQuery && !desc->without_ray_query;
+}
+
+static bool has_ray_pipelines(const device_features *supported, const gpu_desc *desc)
+{
+    return supported->ray_pipeline.rayTracingPipeline && !desc->without_ray_pipelines;
+}
+
 // Lists what the renderer needs and the device has not; NULL when it has everything.
-static const char *device_missing(VkPhysicalDevice device, arena *arena)
+static const char *device_missing(VkPhysicalDevice device, const gpu_desc *desc, arena *arena)
 {
     VkPhysicalDeviceProperties properties;
     vkGetPhysicalDeviceProperties(device, &properties);
@@ -317,6 +329,10 @@ static const char *device_missing(VkPhysicalDevice device, arena *arena)
     for (size_t i = 0; i < countof(required_features); i++)
         if (!*feature_flag(&features, &required_features[i]))
             missing = list_append(arena, missing, required_features[i].name);
+    if (!has_ray_query(&features, desc) && !has_ray_pipelines(&features, desc))
+        missing = list_append(arena, missing,
+                              VK_KHR_RAY_QUERY_EXTENSION_NAME " and " VK_KHR_RAY_TRACING_PIPELINE_EXTENSION_NAME
+                                                              " (one of them is needed)");
     if (device_has_extension(device, VK_KHR_PUSH_DESCRIPTOR_EXTENSION_NAME) &&
         device_max_push_descriptors(device) < GPU_BINDINGS_MAX)
         missing = list_append(arena, missing, arena_printf(arena, "%d push descriptors", GPU_BINDINGS_MAX));
@@ -341,8 +357,8 @@ static VkPhysicalDevice *devices_list(VkInstance instance, uint32_t *count)
     return devices;
 }
 
-// Returns the first usable device whose name contains `filter`, or null after saying why each was refused.
-static VkPhysicalDevice device_pick(VkInstance instance, const char *filter)
+// Returns the first usable device whose name contains what `desc` says, or null after saying why each was refused.
+static VkPhysicalDevice device_pick(VkInstance instance, const gpu_desc *desc)
 {
     arena arena = {0};
     uint32_t count;
@@ -352,11 +368,11 @@ static VkPhysicalDevice device_pick(VkInstance instance, const char *filter)
     for (uint32_t i = 0; i < count && !found; i++) {
         VkPhysicalDeviceProperties properties;
         vkGetPhysicalDeviceProperties(devices[i], &properties);
-        if (filter && !strcasestr(properties.deviceName, filter)) {
+        if (desc->device && !strcasestr(properties.deviceName, desc->device)) {
             other_names = list_append(&arena, other_names, properties.deviceName);
             continue;
         }
-        const char *missing = device_missing(devices[i], &arena);
+        const char *missing = device_missing(devices[i], desc, &arena);
         if (missing)
             refused = list_append(&arena, refused, arena_printf(&arena, "%s lacks %s", properties.deviceName, missing));
         else
@@ -365,7 +381,7 @@ static VkPhysicalDevice device_pick(VkInstance instance, const char *filter)
     if (!found && refused)
         log_error("no usable Vulkan device: %s", refused);
     else if (!found && other_names)
-        log_error("no Vulkan device's name contains \"%s\"; there are: %s", filter, other_names);
+        log_error("no Vulkan device's name contains \"%s\"; there are: %s", desc->device, other_names);
     else if (!found)
         log_error("no Vulkan device found");
     free(devices);
@@ -384,7 +400,7 @@ uint32_t gpu_devices_print(void *out)
     for (uint32_t i = 0; i < count; i++) {
         VkPhysicalDeviceProperties properties;
         vkGetPhysicalDeviceProperties(devices[i], &properties);
-        const char *missing = device_missing(devices[i], &arena);
+        const char *missing = device_missing(devices[i], &(gpu_desc){0}, &arena);
         fprintf(out, "%s: %s%s\n", properties.deviceName, missing ? "lacks " : "usable", missing ? missing : "");
         usable += !missing;
     }
@@ -397,7 +413,7 @@ uint32_t gpu_devices_print(void *out)
 // ---- Device
 
 // Enables what is needed and no more, since some features cost speed merely by being enabled.
-static void device_features_select(gpu *gpu, device_features *enabled)
+static void device_features_select(gpu *gpu, const gpu_desc *desc, device_features *enabled)
 {
     device_features supported;
     device_features_query(gpu->physical, &supported);
@@ -406,18 +422,28 @@ static void device_features_select(gpu *gpu, device_features *enabled)
         *feature_flag(enabled, &required_features[i]) = VK_TRUE;
     enabled->core.features.vertexPipelineStoresAndAtomics = supported.core.features.vertexPipelineStoresAndAtomics;
     enabled->atomic_float.shaderBufferFloat32AtomicAdd = supported.atomic_float.shaderBufferFloat32AtomicAdd;
+    gpu->has_ray_query = has_ray_query(&supported, desc);
+    gpu->has_ray_pipelines = has_ray_pipelines(&supported, desc);
+    enabled->ray_query.rayQuery = gpu->has_ray_query;
+    enabled->ray_pipeline.rayTracingPipeline = gpu->has_ray_pipelines;
     gpu->has_float_atomics = supported.atomic_float.shaderBufferFloat32AtomicAdd;
 }
 
-static bool device_create(gpu *gpu)
+static bool device_create(gpu *gpu, const gpu_desc *desc)
 {
     device_features features;
-    device_features_select(gpu, &features);
-    const char *extensions[countof(required_extensions) + 1];
+    device_features_select(gpu, desc, &features);
+    static const char *const optional_extensions[] = {
+        VK_EXT_SHADER_ATOMIC_FLOAT_EXTENSION_NAME,
+        VK_KHR_RAY_QUERY_EXTENSION_NAME,
+        VK_KHR_RAY_TRACING_PIPELINE_EXTENSION_NAME,
+    };
+    const char *extensions[countof(required_extensions) + countof(optional_extensions)];
     uint32_t extension_count = countof(required_extensions);
     memcpy(extensions, required_extensions, sizeof required_extensions);
-    if (device_has_extension(gpu->physical, VK_EXT_SHADER_ATOMIC_FLOAT_EXTENSION_NAME))
-        extensions[extension_count++] = VK_EXT_SHADER_ATOMIC_FLOAT_EXTENSION_NAME;
+    for (size_t i = 0; i < countof(optional_extensions); i++)
+        if (device_has_extension(gpu->physical, optional_extensions[i]))
+            extensions[extension_count++] = optional_extensions[i];
 
     gpu->queue_family = device_queue_family(gpu->physical, &gpu->timestamp_bits);
     const float priority = 1;
@@ -446,13 +472,21 @@ static void properties_query(gpu *gpu)
     VkPhysicalDeviceAccelerationStructurePropertiesKHR acceleration = {
         .sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_ACCELERATION_STRUCTURE_PROPERTIES_KHR,
     };
+    const bool has_pipelines = device_has_extension(gpu->physical, VK_KHR_RAY_TRACING_PIPELINE_EXTENSION_NAME);
+    VkPhysicalDeviceRayTracingPipelinePropertiesKHR ray_pipeline = {
+        .sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_RAY_TRACING_PIPELINE_PROPERTIES_KHR,
+        .pNext = &acceleration,
+    };
     VkPhysicalDeviceProperties2 properties = {
         .sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_PROPERTIES_2,
-        .pNext = &acceleration,
+        .pNext = has_pipelines ? (void *)&ray_pipeline : (void *)&acceleration,
     };
     vkGetPhysicalDeviceProperties2(gpu->physical, &properties);
     gpu->properties = properties.properties;
     gpu->scratch_alignment = acceleration.minAccelerationStructureScratchOffsetAlignment;
+    gpu->handle_size = ray_pipeline.shaderGroupHandleSize;
+    gpu->handle_alignment = ray_pipeline.shaderGroupHandleAlignment;
+    gpu->table_alignment = ray_pipeline.shaderGroupBaseAlignment;
     vkGetPhysicalDeviceMemoryProperties(gpu->physical, &gpu->memory_types);
 }
 
@@ -489,11 +523,11 @@ gpu *gpu_create(const gpu_desc *desc)
     functions_load(gpu);
     if (desc->validation && !messenger_create(gpu))
         goto fail;
-    gpu->physical = device_pick(gpu->instance, desc->device);
+    gpu->physical = device_pick(gpu->instance, desc);
     if (!gpu->physical)
         goto fail;
     properties_query(gpu);
-    if (!device_create(gpu) || !timestamps_create(gpu) || !gpu_commands_init(gpu) || !gpu_scene_init(gpu))
+    if (!device_create(gpu, desc) || !timestamps_create(gpu) || !gpu_commands_init(gpu) || !gpu_scene_init(gpu))
         goto fail;
     return gpu;
 fail:
@@ -542,6 +576,14 @@ bool gpu_is_cpu(const gpu *gpu)
 bool gpu_has_float_atomics(const gpu *gpu)
 {
     return gpu->has_float_atomics;
+}
+bool gpu_has_ray_query(const gpu *gpu)
+{
+    return gpu->has_ray_query;
+}
+bool gpu_has_ray_pipelines(const gpu *gpu)
+{
+    return gpu->has_ray_pipelines;
 }
 uint32_t gpu_validation_messages(const gpu *gpu)
 {

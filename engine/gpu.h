@@ -30,14 +30,18 @@ typedef struct gpu_acceleration { // a bottom- or top-level acceleration structu
 typedef struct gpu_desc {
     const char *device; // picks the first whose name contains this, without regard to case; NULL: the first usable
     bool validation; // validation layer with synchronization validation; creation fails when the layer is not installed
+    bool without_ray_query, without_ray_pipelines; // for tests: as if the device had none
 } gpu_desc;
 
-// Picks a device that has all that the renderer needs. Returns NULL and names each missing feature when there is none.
+// Picks a device that has all that the renderer needs, ray queries or ray-tracing pipelines among it. Returns NULL and
+// names each missing feature when there is none.
 gpu *gpu_create(const gpu_desc *desc);
 void gpu_destroy(gpu *gpu); // waits for the device and destroys what is still alive; accepts NULL
 const char *gpu_name(const gpu *gpu);
 bool gpu_is_cpu(const gpu *gpu); // lavapipe and the like
 bool gpu_has_float_atomics(const gpu *gpu); // buffer float32 atomic add, needed by the paper's scatter only
+bool gpu_has_ray_query(const gpu *gpu); // in all shaders
+bool gpu_has_ray_pipelines(const gpu *gpu);
 uint32_t gpu_validation_messages(const gpu *gpu); // warnings and errors of the validation layer so far; each is logged
 // Prints one line a device to `out` with what it lacks. Returns the number of usable devices.
 uint32_t gpu_devices_print(void *out /* FILE * */);
@@ -154,6 +158,12 @@ typedef struct gpu_graphics_pipeline_desc {
 } gpu_graphics_pipeline_desc;
 // There is no vertex input: vertex shaders fetch from storage buffers.
 gpu_pipeline gpu_graphics_pipeline_create(gpu *gpu, const gpu_graphics_pipeline_desc *desc);
+
+typedef struct gpu_ray_pipeline_desc { // with its shader binding table: one shader of each kind, no recursion
+    const gpu_shader *raygen, *miss, *closest_hit, *any_hit;
+} gpu_ray_pipeline_desc;
+// Only where gpu_has_ray_pipelines (asserted).
+gpu_pipeline gpu_ray_pipeline_create(gpu *gpu, const gpu_ray_pipeline_desc *desc);
 void gpu_pipeline_destroy(gpu *gpu, gpu_pipeline pipeline);
 
 // ---- Commands. One command stream; submits run in order.
@@ -176,7 +186,12 @@ void gpu_bind(gpu_commands *commands, gpu_pipeline pipeline, const gpu_binding *
 void gpu_push(gpu_commands *commands, const void *data, uint32_t size);
 void gpu_dispatch(gpu_commands *commands, uint32_t x, uint32_t y, uint32_t z); // workgroups; any zero: nothing
 void gpu_dispatch_indirect(gpu_commands *commands, gpu_buffer buffer, VkDeviceSize offset);
+// The ray generation shader of the ray pipeline that was bound last, once for each index below `count`; zero: nothing.
+void gpu_trace_rays(gpu_commands *commands, uint32_t count);
 void gpu_draw(gpu_commands *commands, uint32_t vertices, uint32_t instances, uint32_t first_instance);
+// The same with gl_VertexIndex = indices[first_index + i], i < count, from a buffer of uint32_t with the usage
+// INDEX_BUFFER; equal indices may share what the vertex shader makes.
+void gpu_draw_indexed(gpu_commands *commands, gpu_buffer indices, uint32_t first_index, uint32_t count);
 void gpu_draw_indirect(gpu_commands *commands, gpu_buffer buffer, VkDeviceSize offset); // one VkDrawIndirectCommand
 void gpu_viewport_set(gpu_commands *commands, float x, float y, float width, float height); // scissor too
 void gpu_cull_set(gpu_commands *commands, VkCullModeFlags cull);
@@ -194,7 +209,7 @@ void gpu_timestamp(gpu_commands *commands, uint32_t slot);
 // After the submit has finished: milliseconds of each slot on one clock.
 bool gpu_timestamps_read(gpu *gpu, double *milliseconds, uint32_t count);
 
-// ---- Acceleration structures (ray query)
+// ---- Acceleration structures
 typedef struct gpu_triangles {
     VkDeviceAddress positions; // 3 floats each
     uint32_t position_stride; // bytes

@@ -55,6 +55,7 @@ gpu_commands *gpu_commands_begin(gpu *gpu)
     else
         commands = commands_create(gpu);
     commands->pipeline = (gpu_pipeline){0};
+    commands->indices = (gpu_buffer){0};
     const VkCommandBufferBeginInfo info = {
         .sType = VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO,
         .flags = VK_COMMAND_BUFFER_USAGE_ONE_TIME_SUBMIT_BIT,
@@ -221,9 +222,29 @@ void gpu_dispatch_indirect(gpu_commands *commands, gpu_buffer buffer, VkDeviceSi
     vkCmdDispatchIndirect(commands->handle, gpu_buffer_handle(commands->gpu, buffer), offset);
 }
 
+void gpu_trace_rays(gpu_commands *commands, uint32_t count)
+{
+    const gpu *gpu = commands->gpu;
+    const gpu_pipeline_object *pipeline = gpu_pool_get(&gpu->pipelines, commands->pipeline.id);
+    static const VkStridedDeviceAddressRegionKHR no_callables;
+    assert(pipeline->bind_point == VK_PIPELINE_BIND_POINT_RAY_TRACING_KHR);
+    if (count)
+        gpu->vkCmdTraceRaysKHR(commands->handle, &pipeline->raygen, &pipeline->miss, &pipeline->hit, &no_callables,
+                               count, 1, 1);
+}
+
 void gpu_draw(gpu_commands *commands, uint32_t vertices, uint32_t instances, uint32_t first_instance)
 {
     vkCmdDraw(commands->handle, vertices, instances, 0, first_instance);
+}
+
+void gpu_draw_indexed(gpu_commands *commands, gpu_buffer indices, uint32_t first_index, uint32_t count)
+{
+    if (commands->indices.id != indices.id) {
+        vkCmdBindIndexBuffer(commands->handle, gpu_buffer_handle(commands->gpu, indices), 0, VK_INDEX_TYPE_UINT32);
+        commands->indices = indices;
+    }
+    vkCmdDrawIndexed(commands->handle, count, 1, first_index, 0, 0);
 }
 
 void gpu_draw_indirect(gpu_commands *commands, gpu_buffer buffer, VkDeviceSize offset)

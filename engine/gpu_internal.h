@@ -63,6 +63,9 @@ typedef struct gpu_pipeline_object {
     VkDescriptorType binding_types[GPU_BINDINGS_MAX];
     uint32_t push_size;
     bool uses_scene;
+    // Ray pipelines: the shader binding table and where its parts lie in it.
+    gpu_buffer table;
+    VkStridedDeviceAddressRegionKHR raygen, miss, hit;
 } gpu_pipeline_object;
 
 typedef struct gpu_acceleration_object {
@@ -77,6 +80,7 @@ struct gpu_commands {
     VkCommandBuffer handle;
     VkFence fence;
     gpu_pipeline pipeline; // bound last
+    gpu_buffer indices; // bound last
     gpu_commands *next; // in the list of free ones
 };
 
@@ -92,7 +96,10 @@ typedef struct gpu_sampler {
     X(vkDestroyAccelerationStructureKHR)                                                                               \
     X(vkGetAccelerationStructureBuildSizesKHR)                                                                         \
     X(vkGetAccelerationStructureDeviceAddressKHR)                                                                      \
-    X(vkCmdBuildAccelerationStructuresKHR)
+    X(vkCmdBuildAccelerationStructuresKHR)                                                                             \
+    X(vkCreateRayTracingPipelinesKHR)                                                                                  \
+    X(vkGetRayTracingShaderGroupHandlesKHR)                                                                            \
+    X(vkCmdTraceRaysKHR)
 // Null when the instance has no VK_EXT_debug_utils.
 #define GPU_DEBUG_FUNCTIONS(X)                                                                                         \
     X(vkCreateDebugUtilsMessengerEXT)                                                                                  \
@@ -112,7 +119,8 @@ struct gpu {
     VkPhysicalDeviceProperties properties;
     VkPhysicalDeviceMemoryProperties memory_types;
     VkDeviceSize scratch_alignment; // of acceleration structure builds
-    bool has_float_atomics;
+    uint32_t handle_size, handle_alignment, table_alignment; // bytes, of ray pipelines' shader binding tables
+    bool has_float_atomics, has_ray_query, has_ray_pipelines;
     uint32_t validation_messages;
 #define GPU_MEMBER(name) PFN_##name name;
     GPU_FUNCTIONS(GPU_MEMBER)

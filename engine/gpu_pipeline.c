@@ -263,6 +263,7 @@ void gpu_pipeline_destroy(gpu *gpu, gpu_pipeline pipeline)
     if (!pipeline.id)
         return;
     const gpu_pipeline_object *object = gpu_pool_get(&gpu->pipelines, pipeline.id);
+    gpu_buffer_destroy(gpu, object->table);
     gpu_owned_retire(gpu, &object->owned);
     gpu_pool_remove(&gpu->pipelines, pipeline.id);
 }
@@ -401,6 +402,105 @@ gpu_pipeline gpu_graphics_pipeline_create(gpu *gpu, const gpu_graphics_pipeline_
         vkDestroyShaderModule(gpu->device, stages[i].module, NULL);
     if (done)
         return pipeline_add(gpu, &made);
+    gpu_owned_destroy(gpu, &made.owned);
+    return (gpu_pipeline){0};
+}
+
+// ---- Ray tracing
+
+enum { RAYGEN, MISS, CLOSEST_HIT, ANY_HIT, RAY_STAGES };
+enum { RAYGEN_GROUP, MISS_GROUP, HIT_GROUP, RAY_GROUPS };
+
+static bool ray_stages_init(gpu *gpu, const gpu_ray_pipeline_desc *desc, VkPipelineShaderStageCreateInfo *stages,
+                            gpu_pipeline_object *made)
+{
+    static const specialization none;
+    const struct {
+        VkShaderStageFlagBits bit;
+        const gpu_shader *shader;
+    } sources[RAY_STAGES] = {
+        [RAYGEN] = {VK_SHADER_STAGE_RAYGEN_BIT_KHR, desc->raygen},
+        [MISS] = {VK_SHADER_STAGE_MISS_BIT_KHR, desc->miss},
+        [CLOSEST_HIT] = {VK_SHADER_STAGE_CLOSEST_HIT_BIT_KHR, desc->closest_hit},
+        [ANY_HIT] = {VK_SHADER_STAGE_ANY_HIT_BIT_KHR, desc->any_hit},
+    };
+    for (int i = 0; i < RAY_STAGES; i++)
+        if (!interface_merge(made, sources[i].shader) ||
+            !stage_init(gpu, &stages[i], sources[i].bit, sources[i].shader, &none))
+            return false;
+    return true;
+}
+
+static bool ray_pipeline_create(gpu *gpu, const VkPipelineShaderStageCreateInfo *stages, gpu_pipeline_object *made)
+{
+    const VkRayTracingShaderGroupCreateInfoKHR unused = {
+        .sType = VK_STRUCTURE_TYPE_RAY_TRACING_SHADER_GROUP_CREATE_INFO_KHR,
+        .type = VK_RAY_TRACING_SHADER_GROUP_TYPE_GENERAL_KHR,
+        .generalShader = VK_SHADER_UNUSED_KHR,
+        .closestHitShader = VK_SHADER_UNUSED_KHR,
+        .anyHitShader = VK_SHADER_UNUSED_KHR,
+        .intersectionShader = VK_SHADER_UNUSED_KHR,
+    };
+    VkRayTracingShaderGroupCreateInfoKHR groups[RAY_GROUPS] = {unused, unused, unused};
+    groups[RAYGEN_GROUP].generalShader = RAYGEN;
+    groups[MISS_GROUP].generalShader = MISS;
+    groups[HIT_GROUP].type = VK_RAY_TRACING_SHADER_GROUP_TYPE_TRIANGLES_HIT_GROUP_KHR;
+    groups[HIT_GROUP].closestHitShader = CLOSEST_HIT;
+    groups[HIT_GROUP].anyHitShader = ANY_HIT;
+    const VkRayTracingPipelineCreateInfoKHR info = {
+        .sType = VK_STRUCTURE_TYPE_RAY_TRACING_PIPELINE_CREATE_INFO_KHR,
+        .stageCount = RAY_STAGES,
+        .pStages = stages,
+        .groupCount = RAY_GROUPS,
+        .pGroups = groups,
+        .maxPipelineRayRecursionDepth = 1,
+        .layout = made->owned.layout,
+    };
+    return VK(gpu->vkCreateRayTracingPipelinesKHR(gpu->device, VK_NULL_HANDLE, VK_NULL_HANDLE, 1, &info, NULL,
+                                                  &made->owned.pipeline),
+              made->name);
+}
+
+// One record a group, each at the alignment that a region's start needs.
+static bool ray_table_create(gpu *gpu, gpu_pipeline_object *made)
+{
+    const VkDeviceSize stride = align_up(gpu->handle_size, max_u32(gpu->handle_alignment, gpu->table_alignment));
+    const gpu_buffer_desc desc = {
+        .name = "shader binding table",
+        .size = RAY_GROUPS * stride + gpu->table_alignment, // room for aligning the address
+        .usage = VK_BUFFER_USAGE_SHADER_BINDING_TABLE_BIT_KHR | VK_BUFFER_USAGE_SHADER_DEVICE_ADDRESS_BIT,
+        .host = true,
+    };
+    made->table = gpu_buffer_create_unbound(gpu, &desc);
+    if (!made->table.id)
+        return false;
+    const VkDeviceAddress address = gpu_buffer_address(gpu, made->table);
+    const VkDeviceAddress first = align_up(address, gpu->table_alignment);
+    uint8_t *records = (uint8_t *)gpu_buffer_map(gpu, made->table) + (first - address);
+    VkStridedDeviceAddressRegionKHR *const regions[RAY_GROUPS] = {&made->raygen, &made->miss, &made->hit};
+    for (uint32_t group = 0; group < RAY_GROUPS; group++) {
+        *regions[group] = (VkStridedDeviceAddressRegionKHR){first + group * stride, stride, stride};
+        if (!VK(gpu->vkGetRayTracingShaderGroupHandlesKHR(gpu->device, made->owned.pipeline, group, 1, gpu->handle_size,
+                                                          records + group * stride),
+                made->name))
+            return false;
+    }
+    return true;
+}
+
+gpu_pipeline gpu_ray_pipeline_create(gpu *gpu, const gpu_ray_pipeline_desc *desc)
+{
+    assert(gpu->has_ray_pipelines);
+    gpu_pipeline_object made = {.bind_point = VK_PIPELINE_BIND_POINT_RAY_TRACING_KHR};
+    snprintf(made.name, sizeof made.name, "%s", desc->raygen->name);
+    VkPipelineShaderStageCreateInfo stages[RAY_STAGES] = {0};
+    const bool done = ray_stages_init(gpu, desc, stages, &made) && layout_create(gpu, &made) &&
+                      ray_pipeline_create(gpu, stages, &made) && ray_table_create(gpu, &made);
+    for (size_t i = 0; i < countof(stages); i++)
+        vkDestroyShaderModule(gpu->device, stages[i].module, NULL);
+    if (done)
+        return pipeline_add(gpu, &made);
+    gpu_buffer_destroy(gpu, made.table);
     gpu_owned_destroy(gpu, &made.owned);
     return (gpu_pipeline){0};
 }

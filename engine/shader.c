@@ -150,9 +150,10 @@ static const struct {
     const char *suffix;
     glslang_stage_t stage;
 } stages[] = {
-    {".comp.glsl", GLSLANG_STAGE_COMPUTE},
-    {".vert.glsl", GLSLANG_STAGE_VERTEX},
-    {".frag.glsl", GLSLANG_STAGE_FRAGMENT},
+    {".comp.glsl", GLSLANG_STAGE_COMPUTE},  {".vert.glsl", GLSLANG_STAGE_VERTEX},
+    {".frag.glsl", GLSLANG_STAGE_FRAGMENT}, {".rgen.glsl", GLSLANG_STAGE_RAYGEN},
+    {".rmiss.glsl", GLSLANG_STAGE_MISS},    {".rchit.glsl", GLSLANG_STAGE_CLOSESTHIT},
+    {".rahit.glsl", GLSLANG_STAGE_ANYHIT},
 };
 
 static bool stage_of(const char *path, glslang_stage_t *stage)
@@ -165,7 +166,10 @@ static bool stage_of(const char *path, glslang_stage_t *stage)
             return true;
         }
     }
-    log_error("%s: the name of a shader ends in .comp.glsl, .vert.glsl or .frag.glsl", path);
+    log_error(
+        "%s: the name of a shader ends in .comp.glsl, .vert.glsl, .frag.glsl, .rgen.glsl, .rmiss.glsl, .rchit.glsl "
+        "or .rahit.glsl",
+        path);
     return false;
 }
 

@@ -4,7 +4,7 @@
 
 #include "gpu.h"
 
-// Compiles `path`, whose stage is told by its name: `<module>[.<step>].<comp|vert|frag>.glsl`. `#include "x"` is looked
+// Compiles `path`, whose stage is told by its name: `<module>[.<step>].<comp|vert|frag|rgen|rmiss|rchit|rahit>.glsl`. `#include "x"` is looked
 // up beside the including file. Returns false and logs glslang's messages with file and line on failure; on
 // success `*shader` owns memory: release it with shader_fini.
 bool shader_compile(const char *path, gpu_shader *shader);

@@ -10,8 +10,10 @@
 
 enum { NAME_SIZE = 64 };
 
+enum { KINDS = RAYS_NEAREST + 1 };
+
 typedef struct rays_state {
-    gpu_pipeline pipelines[2]; // by rays_kind
+    gpu_pipeline query[KINDS], pipeline[KINDS]; // made when first needed: no device need have both
     embree_rays *embree; // made when first needed
     bool no_embree; // it could not be made
 } rays_state;
@@ -19,7 +21,7 @@ typedef struct rays_state {
 typedef struct rays_pass { // of a tracing pass
     rays_kind kind;
     uint32_t count;
-    gpu_pipeline pipeline;
+    gpu_pipeline pipeline; // of a GPU's passes
     embree_rays *embree;
     char origins[NAME_SIZE], directions[NAME_SIZE], answers[NAME_SIZE];
 } rays_pass;
@@ -39,10 +41,18 @@ static rays_state *state_of(const renderer *r)
     return ((render_pass *)ecs_get(r->world, renderer_pass_find(r, "rays"), r->pass))->state;
 }
 
+ray_method rays_tracer(const renderer *r)
+{
+    if (r->settings.rays != RAYS_AUTO)
+        return r->settings.rays;
+    if (gpu_is_cpu(r->gpu) && !state_of(r)->no_embree)
+        return RAYS_EMBREE;
+    return gpu_has_ray_query(r->gpu) ? RAYS_QUERY : RAYS_PIPELINE;
+}
+
 bool rays_are_host(const renderer *r)
 {
-    const bool possible = gpu_is_cpu(r->gpu) && !state_of(r)->no_embree;
-    return possible && (r->settings.rays == RAYS_AUTO || r->settings.rays == RAYS_EMBREE);
+    return rays_tracer(r) == RAYS_EMBREE;
 }
 
 // ---- Batches
@@ -95,6 +105,14 @@ static void query_execute(const frame_graph_context *context, void *user)
     gpu_dispatch(context->commands, div_up_u32(pass->count, 256), 1, 1);
 }
 
+static void pipeline_execute(const frame_graph_context *context, void *user)
+{
+    const rays_pass *pass = user;
+    frame_graph_bind(context, pass->pipeline);
+    gpu_push(context->commands, &pass->count, sizeof pass->count);
+    gpu_trace_rays(context->commands, pass->count);
+}
+
 static void *mapping_of(const frame_graph_context *context, const char *name)
 {
     return gpu_buffer_map(context->gpu, frame_graph_buffer(context, name));
@@ -114,9 +132,19 @@ static void embree_execute(const frame_graph_context *context, void *user)
 
 void rays_trace(renderer *r, const char *batch, rays_kind kind, uint32_t count)
 {
+    static const struct {
+        frame_graph_pass_kind pass_kind;
+        void (*execute)(const frame_graph_context *context, void *user);
+    } tracers[] = {
+        [RAYS_QUERY] = {FRAME_GRAPH_COMPUTE, query_execute},
+        [RAYS_PIPELINE] = {FRAME_GRAPH_RAY_TRACING, pipeline_execute},
+        [RAYS_EMBREE] = {FRAME_GRAPH_HOST, embree_execute},
+    };
     const rays_state *state = state_of(r);
-    const bool host = rays_are_host(r);
-    rays_pass args = {.kind = kind, .count = count, .pipeline = state->pipelines[kind], .embree = state->embree};
+    const ray_method tracer = rays_tracer(r);
+    const bool host = tracer == RAYS_EMBREE;
+    rays_pass args = {.kind = kind, .count = count, .embree = state->embree};
+    args.pipeline = tracer == RAYS_PIPELINE ? state->pipeline[kind] : state->query[kind];
     name_print(args.origins, batch, "_origins");
     name_print(args.directions, batch, "_directions");
     name_print(args.answers, batch, kind == RAYS_NEAREST ? "_hits" : "_visible");
@@ -124,8 +152,8 @@ void rays_trace(renderer *r, const char *batch, rays_kind kind, uint32_t count)
     name_print(name, batch, "/trace");
     const frame_graph_pass_desc desc = {
         .name = name,
-        .kind = host ? FRAME_GRAPH_HOST : FRAME_GRAPH_COMPUTE,
-        .execute = host ? embree_execute : query_execute,
+        .kind = tracers[tracer].pass_kind,
+        .execute = tracers[tracer].execute,
         .user = &args,
         .user_size = sizeof args,
     };
@@ -155,27 +183,77 @@ static void embree_make(renderer *r, rays_state *state)
         embree_rays_create(r->scene, gpu_buffer_map(r->gpu, w->positions), gpu_buffer_map(r->gpu, w->indices));
     state->no_embree = !state->embree;
     if (state->no_embree && r->settings.rays == RAYS_AUTO)
-        log_info("--rays auto: Embree has no device here; rays are traced by query");
+        log_info("--rays auto: Embree has no device here; rays are traced by the Vulkan device");
 }
 
-// Has Embree ready where it shall trace. False where --rays asks for what cannot be had (logged).
+// Has Embree ready. False where it cannot be had (logged).
 static bool embree_require(renderer *r, rays_state *state)
 {
-    if (rays_are_host(r) && !state->embree)
+    if (!gpu_is_cpu(r->gpu)) {
+        log_error(
+            "--rays embree: Embree traces in the memory of a CPU, and %s is none; expected auto, query or pipeline",
+            gpu_name(r->gpu));
+        return false;
+    }
+    if (!state->embree && !state->no_embree)
         embree_make(r, state);
-    if (r->settings.rays != RAYS_EMBREE || state->embree)
-        return true;
-    if (gpu_is_cpu(r->gpu))
-        log_error("--rays embree: Embree has no device here; expected auto or query");
-    else
-        log_error("--rays embree: Embree traces in the memory of a CPU, and %s is none; expected auto or query",
-                  gpu_name(r->gpu));
-    return false;
+    if (!state->embree && r->settings.rays == RAYS_EMBREE)
+        log_error("--rays embree: Embree has no device here; expected auto, query or pipeline");
+    return state->embree;
+}
+
+static bool query_require(renderer *r, rays_state *state)
+{
+    static const gpu_shader *const shaders[KINDS] = {
+        [RAYS_VISIBLE] = &shader_rays_visible_comp,
+        [RAYS_NEAREST] = &shader_rays_nearest_comp,
+    };
+    if (!gpu_has_ray_query(r->gpu)) {
+        log_error("--rays query: %s has no ray query; expected auto or pipeline", gpu_name(r->gpu));
+        return false;
+    }
+    for (uint32_t kind = 0; kind < KINDS; kind++)
+        if (!state->query[kind].id)
+            state->query[kind] =
+                gpu_compute_pipeline_create(r->gpu, &(gpu_compute_pipeline_desc){.shader = shaders[kind]});
+    return state->query[RAYS_VISIBLE].id && state->query[RAYS_NEAREST].id;
+}
+
+static bool pipeline_require(renderer *r, rays_state *state)
+{
+    static const gpu_shader *const shaders[KINDS] = {
+        [RAYS_VISIBLE] = &shader_rays_visible_rgen,
+        [RAYS_NEAREST] = &shader_rays_nearest_rgen,
+    };
+    if (!gpu_has_ray_pipelines(r->gpu)) {
+        log_error("--rays pipeline: %s has no ray-tracing pipelines; expected auto or query", gpu_name(r->gpu));
+        return false;
+    }
+    for (uint32_t kind = 0; kind < KINDS; kind++) {
+        const gpu_ray_pipeline_desc desc = {
+            .raygen = shaders[kind],
+            .miss = &shader_rays_rmiss,
+            .closest_hit = &shader_rays_rchit,
+            .any_hit = &shader_rays_rahit,
+        };
+        if (!state->pipeline[kind].id)
+            state->pipeline[kind] = gpu_ray_pipeline_create(r->gpu, &desc);
+    }
+    return state->pipeline[RAYS_VISIBLE].id && state->pipeline[RAYS_NEAREST].id;
+}
+
+// Has the tracer of this frame ready. False where --rays asks for what cannot be had (logged).
+static bool tracer_require(renderer *r, rays_state *state)
+{
+    // Where `auto` finds no Embree, that changes the choice.
+    if (rays_are_host(r) && (embree_require(r, state) || rays_are_host(r)))
+        return state->embree;
+    return rays_tracer(r) == RAYS_QUERY ? query_require(r, state) : pipeline_require(r, state);
 }
 
 static void rays_setup(renderer *r, void *user)
 {
-    if (!embree_require(r, user)) {
+    if (!tracer_require(r, user)) {
         r->failed = true;
         return;
     }
@@ -192,19 +270,14 @@ static void rays_fini(renderer *r, void *user)
 {
     rays_state *state = user;
     embree_rays_destroy(state->embree);
-    for (uint32_t kind = 0; kind < 2; kind++)
-        gpu_pipeline_destroy(r->gpu, state->pipelines[kind]);
+    for (uint32_t kind = 0; kind < KINDS; kind++) {
+        gpu_pipeline_destroy(r->gpu, state->query[kind]);
+        gpu_pipeline_destroy(r->gpu, state->pipeline[kind]);
+    }
 }
 
 bool rays_init(renderer *r)
 {
-    rays_state *state = renderer_pass_add(r, "rays", sizeof(rays_state), rays_setup, rays_fini);
-    const gpu_shader *const shaders[] = {
-        [RAYS_VISIBLE] = &shader_rays_visible_comp,
-        [RAYS_NEAREST] = &shader_rays_nearest_comp,
-    };
-    for (uint32_t kind = 0; kind < 2; kind++)
-        state->pipelines[kind] =
-            gpu_compute_pipeline_create(r->gpu, &(gpu_compute_pipeline_desc){.shader = shaders[kind]});
-    return state->pipelines[0].id && state->pipelines[1].id;
+    renderer_pass_add(r, "rays", sizeof(rays_state), rays_setup, rays_fini);
+    return true;
 }

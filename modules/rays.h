@@ -1,6 +1,6 @@
 // Rays in batches: a pass of a module writes rays into two buffers, the tracing pass answers them, another pass of the
-// module uses the answers. Who traces is decided here alone (--rays): ray query in a compute shader, or Embree on the
-// CPU as a host pass.
+// module uses the answers. Who traces is decided here alone (--rays): ray query in a compute shader, a
+// ray-tracing pipeline, or Embree on the CPU as a host pass.
 //
 //     const uint32_t count = r->settings.width * r->settings.height;
 //     rays_create(r, pass, "shadow", count);               // in the pass that makes the rays: the next two bindings
@@ -13,7 +13,7 @@
 //   X_visible     uint      RAYS_VISIBLE: 1 where nothing lies on the ray within its reach; undefined without a ray
 //   X_hits        ray_hit   RAYS_NEAREST: instance RAY_MISS where nothing was hit, or there is no ray
 //
-// Both tracers respect alpha masks and see both sides of every triangle. They find the same hits but for rounding.
+// All tracers respect alpha masks and see both sides of every triangle. They find the same hits but for rounding.
 #pragma once
 
 #include "renderer.h"
@@ -23,6 +23,9 @@ typedef enum rays_kind { RAYS_VISIBLE, RAYS_NEAREST } rays_kind;
 // What one batch holds at most without being asked to be larger: 64 MiB a buffer.
 enum { RAYS_BATCH = 1 << 22 };
 
+// The tracer of this frame, never RAYS_AUTO: Embree where the device is a CPU, else ray query where the device has it,
+// else pipelines.
+ray_method rays_tracer(const renderer *r);
 bool rays_are_host(const renderer *r); // Embree traces
 void rays_create(renderer *r, frame_graph_pass *pass, const char *batch, uint32_t count);
 // The same buffers, made by other hands: for a batch that several passes fill, `from` is renamed to `to`.

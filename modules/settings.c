@@ -258,7 +258,7 @@ static const setting_info table[] = {
      .type = SETTING_ENUM,
      FIELD(rays),
      .values = ray_names,
-     .help = "who traces rays; auto: Embree where the Vulkan device is a CPU, else ray query"},
+     .help = "who traces rays; auto: Embree where the device is a CPU, else query, else pipeline"},
     {.name = "no-ray-order",
      .type = SETTING_FALSE,
      FIELD(ray_order),

@@ -18,7 +18,7 @@ typedef enum sampling_method { SAMPLING_IMPORTANCE, SAMPLING_UNIFORM } sampling_
 typedef struct render_settings {
     uint32_t width, height; // pixels
     uint32_t method;
-    uint32_t rays; // who traces them; RAYS_AUTO: Embree where the Vulkan device is a CPU
+    uint32_t rays; // who traces them; RAYS_AUTO: Embree where the device is a CPU, else query where it can, else pipeline
     bool ray_order; // rays are compacted and ordered before a GPU traces them
     float ray_budget; // indirect shadow rays per pixel on average, at most shadow_samples; 0: shadow_samples everywhere
     uint32_t vpls; // slots, 0 to 2,500,000

@@ -1,11 +1,7 @@
 // What a pixel sees: normals, albedo, emission and motion. See modules/renderer.h for the targets.
 #version 460
 #extension GL_GOOGLE_include_directive : require
-#include "scene.glsl.h"
-
-layout(constant_id = 0) const bool ALPHA_MASK = false; // without discard the depth test stays early
-
-layout(push_constant, scalar) uniform draw_block { uint instance; uint primitive; } draw;
+#include "gbuffer_draw.glsl.h"
 
 layout(location = 0) in vec3 in_relative;
 layout(location = 1) in vec3 in_previous_relative;
@@ -28,10 +24,10 @@ vec3 normalize_or(vec3 v, vec3 fallback)
     return square > TINY ? v * inversesqrt(square) : fallback;
 }
 
-// With mip mapping by the implicit derivatives.
+// With mip mapping by the implicit derivatives. A draw has one material, so that the index is uniform.
 vec4 texture_sample(texture_reference reference)
 {
-    return texture(textures[nonuniformEXT(reference.texture)], texture_uv(reference, in_uvs.xy, in_uvs.zw));
+    return texture(textures[reference.texture], texture_uv(reference, in_uvs.xy, in_uvs.zw));
 }
 
 // Tangent and bitangent from the screen's derivatives, for meshes without tangents (Schueler 2013, "Normal Mapping
@@ -86,17 +82,19 @@ vec2 motion_vector()
 void main()
 {
     material m = materials[primitives[draw.primitive].material];
-    vec4 color = m.base_color * in_color;
-    if (m.base_texture.texture != TEXTURE_NONE)
+    vec4 color = m.base_color;
+    if (VERTEX_COLORS)
+        color *= in_color;
+    if (BASE_TEXTURE)
         color *= texture_sample(m.base_texture);
     vec3 emission = m.emissive;
-    if (m.emissive_texture.texture != TEXTURE_NONE)
+    if (EMISSIVE_TEXTURE)
         emission *= texture_sample(m.emissive_texture).rgb;
 
     vec3 to_eye = normalize(-in_relative);
     vec3 geometric = normalize_or(in_geometric, to_eye);
     vec3 normal = normalize_or(in_normal, geometric);
-    if (m.normal_texture.texture != TEXTURE_NONE)
+    if (NORMAL_TEXTURE)
         normal = mapped_normal(m, normal);
     if (dot(geometric, to_eye) < 0.0) { // the back of a double-sided surface
         geometric = -geometric;
@@ -107,7 +105,7 @@ void main()
     out_normals = vec4(octahedral_encode(geometric), octahedral_encode(normal));
     out_albedo = vec4(clamp(color.rgb, 0.0, 1.0), 1.0);
     out_emission = vec4(emission, 1.0);
-    out_motion = motion_vector();
+    out_motion = MOVES ? motion_vector() : vec2(0.0);
     // Last, since the samples above need the derivatives of whole quads.
     if (ALPHA_MASK && color.a < m.alpha_cutoff)
         discard;

@@ -1,10 +1,9 @@
-// One corner of a triangle of the drawn primitive, pulled from the scene's buffers. Positions leave relative to the eye,
-// so that world coordinates far from the origin cost no precision.
+// One corner of a triangle of the drawn primitive, pulled from the scene's buffers: gl_VertexIndex is a corner number of
+// modules/clusters.h. Positions leave relative to the eye, so that world coordinates far from the origin cost no
+// precision. What the draw does not need is left undefined.
 #version 460
 #extension GL_GOOGLE_include_directive : require
-#include "scene.glsl.h"
-
-layout(push_constant, scalar) uniform draw_block { uint instance; uint primitive; } draw;
+#include "gbuffer_draw.glsl.h"
 
 layout(location = 0) out vec3 out_relative;          // world, minus the eye
 layout(location = 1) out vec3 out_previous_relative; // last frame's, minus last frame's eye
@@ -37,13 +36,17 @@ void main()
     vec4 normal_matrix[3] = instances[draw.instance].normal_matrix;
     float handedness = instances[draw.instance].mirrored != 0u ? -1.0 : 1.0;
     out_relative = relative_position(world, position, frame.eye);
-    out_previous_relative =
-        relative_position(instances[draw.instance].previous_world, position, frame.previous_eye);
+    if (MOVES)
+        out_previous_relative =
+            relative_position(instances[draw.instance].previous_world, position, frame.previous_eye);
     out_normal = rows_rotate(normal_matrix, own.normal);
     out_geometric = rows_rotate(normal_matrix, cross(b - a, c - a));
-    out_tangent = vec4(rows_rotate(world, own.tangent.xyz), own.tangent.w * handedness);
-    out_uvs = vec4(own.uv0, own.uv1);
-    out_color = vertex_color(own);
+    if (NORMAL_TEXTURE)
+        out_tangent = vec4(rows_rotate(world, own.tangent.xyz), own.tangent.w * handedness);
+    if (BASE_TEXTURE || EMISSIVE_TEXTURE || NORMAL_TEXTURE)
+        out_uvs = vec4(own.uv0, own.uv1);
+    if (VERTEX_COLORS)
+        out_color = vertex_color(own);
 
     gl_Position = frame.view_projection * vec4(out_relative, 0.0);
     gl_Position.z = frame.near_plane; // what the eye's translation leaves of the third row

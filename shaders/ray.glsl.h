@@ -2,16 +2,10 @@
 #ifndef RAY_GLSL_H
 #define RAY_GLSL_H
 
-#include "scene.glsl.h"
+#include "alpha_mask.glsl.h"
 #extension GL_EXT_ray_query : require
 
 layout(set = 0, binding = TLAS_BINDING) uniform accelerationStructureEXT tlas;
-
-bool alpha_passes(surface_hit hit)
-{
-    surface_vertices v = hit_vertices(hit);
-    return hit_base_color(hit, v, 0.0).a >= materials[v.material].alpha_cutoff;
-}
 
 // Steps the query to its end; candidates are triangles with an alpha mask. A macro, since glslang cannot pass queries.
 #define RAY_PROCEED(query)                                                                                             \

@@ -1,7 +1,7 @@
-// Rays in batches: both tracers find what the geometry says, and the same in scenes.
+// Rays in batches: all tracers find what the geometry says, and the same in scenes.
 //
 //     device_rays                      the tests
-//     device_rays bench SCENE [RAYS]   millions of shadow rays per second: by query, by Embree, and by Embree alone
+//     device_rays bench SCENE [RAYS]   millions of shadow rays per second: by each tracer, and by Embree alone
 #include "engine/gpu_internal.h"
 #include "engine/parallel.h"
 #include "modules/rays.h"
@@ -18,7 +18,7 @@
 #define OWN_SCENES BUILD_DIR "/scenes/"
 
 static gpu *device;
-static const uint32_t tracers[] = {RAYS_QUERY, RAYS_EMBREE};
+static const uint32_t tracers[] = {RAYS_QUERY, RAYS_PIPELINE, RAYS_EMBREE};
 
 typedef struct ray {
     float origin[3], reach, direction[3], unused;
@@ -112,7 +112,7 @@ static answers trace(renderer *r, uint32_t tracer, const ray *rays, uint32_t cou
     state->count = count;
     r->settings.rays = tracer;
     CHECK(state->list.id && renderer_frame(r));
-    CHECK(rays_are_host(r) == (tracer == RAYS_EMBREE));
+    CHECK(rays_tracer(r) == tracer && rays_are_host(r) == (tracer == RAYS_EMBREE));
     const answers a = {memory_alloc(max_u32(count, 1) * sizeof *a.hits),
                        memory_alloc(max_u32(count, 1) * sizeof *a.visible)};
     export_read(r, "near_hits", a.hits, count * sizeof *a.hits);
@@ -185,7 +185,7 @@ TEST(rays_find_the_nearest_quad_within_their_reach)
     renderer_destroy(r);
 }
 
-// ---- The two tracers against each other
+// ---- The tracers against each other
 
 static uint32_t random_state;
 
@@ -255,13 +255,13 @@ static double hit_distance(const renderer *r, const ray *ray, const ray_hit *hit
     return distance;
 }
 
-typedef struct differences {
+typedef struct differences { // of the other tracers, from query
     uint32_t hits; // rays that hit something by query
     uint32_t found; // that one tracer lets hit and the other miss
     uint32_t triangles; // that both let hit, but other triangles
     uint32_t distances; // that both let hit, but not at the same distance
     uint32_t visible; // that one tracer lets through and the other does not
-    uint32_t itself; // where Embree's two answers do not agree with each other
+    uint32_t itself; // where the other's two answers do not agree with each other
     double worst; // difference of distances, over all that both let hit, as a multiple of what is allowed
 } differences;
 
@@ -277,27 +277,36 @@ static bool hits_same_triangle(const ray_hit *a, const ray_hit *b)
     return a->instance == b->instance && a->geometry == b->geometry && a->triangle == b->triangle;
 }
 
+static void differences_add(differences *d, const renderer *r, const ray *ray, const answers *query,
+                            const answers *other, uint32_t i)
+{
+    const bool query_found = query->hits[i].instance != RAY_MISS, found = other->hits[i].instance != RAY_MISS;
+    d->found += found != query_found;
+    d->visible += ray->reach > 0 && query->visible[i] != other->visible[i];
+    d->itself += ray->reach > 0 && other->visible[i] == found;
+    if (!found || !query_found)
+        return;
+    const double expected = hit_distance(r, ray, &query->hits[i]);
+    const double error = fabs(hit_distance(r, ray, &other->hits[i]) - expected) / distance_tolerance(r, expected);
+    d->triangles += !hits_same_triangle(&query->hits[i], &other->hits[i]);
+    d->distances += error > 1;
+    d->worst = fmax(d->worst, error);
+}
+
 static differences compare(renderer *r, const ray *rays, uint32_t count)
 {
-    answers query = trace(r, RAYS_QUERY, rays, count), embree = trace(r, RAYS_EMBREE, rays, count);
+    static const uint32_t others[] = {RAYS_PIPELINE, RAYS_EMBREE};
+    answers query = trace(r, RAYS_QUERY, rays, count);
     differences d = {0};
-    for (uint32_t i = 0; i < count; i++) {
-        const bool query_found = query.hits[i].instance != RAY_MISS, found = embree.hits[i].instance != RAY_MISS;
-        d.hits += query_found;
-        d.found += found != query_found;
-        d.visible += rays[i].reach > 0 && query.visible[i] != embree.visible[i];
-        d.itself += rays[i].reach > 0 && embree.visible[i] == found;
-        if (!found || !query_found)
-            continue;
-        const double expected = hit_distance(r, &rays[i], &query.hits[i]);
-        const double difference = fabs(hit_distance(r, &rays[i], &embree.hits[i]) - expected);
-        const double error = difference / distance_tolerance(r, expected);
-        d.triangles += !hits_same_triangle(&query.hits[i], &embree.hits[i]);
-        d.distances += error > 1;
-        d.worst = fmax(d.worst, error);
+    for (uint32_t i = 0; i < count; i++)
+        d.hits += query.hits[i].instance != RAY_MISS;
+    for (size_t t = 0; t < countof(others); t++) {
+        answers other = trace(r, others[t], rays, count);
+        for (uint32_t i = 0; i < count; i++)
+            differences_add(&d, r, &rays[i], &query, &other, i);
+        answers_free(&other);
     }
     answers_free(&query);
-    answers_free(&embree);
     return d;
 }
 
@@ -320,7 +329,7 @@ static differences scene_compare(const scene_data *scene, const char *name, uint
     return d;
 }
 
-TEST(both_find_the_same_in_scenes)
+TEST(all_find_the_same_in_scenes)
 {
     static const char *const paths[] = {
         OWN_SCENES "cornell.glb",
@@ -460,7 +469,7 @@ static void instances_compare(renderer *r, const char *name, uint32_t instances)
     free(rays);
 }
 
-TEST(both_find_the_same_instances_wherever_they_move)
+TEST(all_find_the_same_instances_wherever_they_move)
 {
     quad_scene s;
     quad_scene_init(&s);
@@ -584,7 +593,7 @@ TEST(only_the_structure_that_is_traced_is_built)
     for (size_t t = 0; t < countof(tracers); t++) {
         answers a = trace(r, tracers[t], &down, 1);
         CHECK(pass_ran(r, "near/trace") && pass_ran(r, "seen/trace"));
-        CHECK(pass_ran(r, "acceleration") == (tracers[t] == RAYS_QUERY));
+        CHECK(pass_ran(r, "acceleration") == (tracers[t] != RAYS_EMBREE));
         CHECK(pass_ran(r, "rays/scene") == (tracers[t] == RAYS_EMBREE));
         answers_free(&a);
     }
@@ -788,25 +797,27 @@ static int print_bench(const char *path, uint32_t count)
     bare_build(&b, scene);
     ray *rays = memory_alloc(count * sizeof *rays);
     shadow_rays(r, rays, count);
-    double query[REPEATS], embree[REPEATS], alone[REPEATS], visible = 0;
+    double times[countof(tracers)][REPEATS], alone[REPEATS], visible = 0;
     for (int i = 0; i < REPEATS; i++) { // in turns, so that what else runs hits all alike
-        answers a = trace(r, RAYS_QUERY, rays, count);
-        query[i] = pass_milliseconds(r, "seen/trace");
-        answers_free(&a);
-        a = trace(r, RAYS_EMBREE, rays, count);
-        embree[i] = pass_milliseconds(r, "seen/trace");
+        for (size_t t = 0; t < countof(tracers); t++) {
+            answers a = trace(r, tracers[t], rays, count);
+            times[t][i] = pass_milliseconds(r, "seen/trace");
+            visible = 0;
+            for (uint32_t k = 0; k < count; k++)
+                visible += a.visible[k];
+            answers_free(&a);
+        }
         alone[i] = bare_milliseconds(&b, pool, rays, count);
-        visible = 0;
-        for (uint32_t k = 0; k < count; k++)
-            visible += a.visible[k];
-        answers_free(&a);
     }
-    const double scale = 1e-3 * count, query_rate = scale / median(query, REPEATS),
-                 embree_rate = scale / median(embree, REPEATS), alone_rate = scale / median(alone, REPEATS);
+    double rates[countof(tracers)];
+    for (size_t t = 0; t < countof(tracers); t++)
+        rates[t] = 1e-3 * count / median(times[t], REPEATS);
+    const double alone_rate = 1e-3 * count / median(alone, REPEATS);
     printf("%s, %u shadow rays, %.1f %% visible, %u threads; Mray/s, median of %d\n", path, count,
            100 * visible / count, parallel_threads(pool), REPEATS);
-    printf("query %.2f, embree %.2f (%.1f times query), embree alone, opaque %.2f (in the renderer %.2f of it)\n",
-           query_rate, embree_rate, embree_rate / query_rate, alone_rate, embree_rate / alone_rate);
+    printf("query %.2f, pipeline %.2f, embree %.2f (%.1f times query), embree alone, opaque %.2f (in the renderer %.2f "
+           "of it)\n",
+           rates[0], rates[1], rates[2], rates[2] / rates[0], alone_rate, rates[2] / alone_rate);
     free(rays);
     free(b.rays);
     rtcReleaseScene(b.scene);
@@ -825,6 +836,11 @@ int main(int argc, char **argv)
         printf("skipped: no device with the validation layer\n");
         return 77;
     }
+    if (!gpu_has_ray_query(device) || !gpu_has_ray_pipelines(device)) {
+        printf("skipped: %s has not both ray queries and ray-tracing pipelines\n", gpu_name(device));
+        gpu_destroy(device);
+        return 77;
+    }
     if (!gpu_is_cpu(device)) {
         printf("skipped: %s is not a CPU, so that there is no Embree to compare with\n", gpu_name(device));
         gpu_destroy(device);
@@ -833,9 +849,9 @@ int main(int argc, char **argv)
     if (bench)
         return print_bench(argv[2], argc > 3 ? (uint32_t)strtoul(argv[3], NULL, 10) : 230400);
     RUN(rays_find_the_nearest_quad_within_their_reach);
-    RUN(both_find_the_same_in_scenes);
+    RUN(all_find_the_same_in_scenes);
     RUN(alpha_masks_let_the_same_rays_through);
-    RUN(both_find_the_same_instances_wherever_they_move);
+    RUN(all_find_the_same_instances_wherever_they_move);
     RUN(a_moved_quad_is_hit_where_it_went);
     RUN(primitives_without_triangles_leave_the_count_of_geometries);
     RUN(an_empty_batch_is_traced);

@@ -661,6 +661,25 @@ TEST(acceleration_structure_is_built_before_it_is_traced)
           VK_PIPELINE_STAGE_2_ACCELERATION_STRUCTURE_BUILD_BIT_KHR);
 }
 
+TEST(ray_tracing_pass_waits_and_is_waited_for_in_its_own_stage)
+{
+    const frame_graph_input *const input =
+        INPUT(PASSES(COMPUTE("make", create("rays", BUFFER, ACCESS_STORAGE_WRITE)),
+                     COMPUTE("build", modify("tlas", "scene", ACCESS_BUILD_WRITE)),
+                     pass_of("trace", FRAME_GRAPH_RAY_TRACING, false,
+                             USES(reads("scene", ACCESS_TRACE), reads("rays", ACCESS_STORAGE_READ),
+                                  create("hits", BUFFER, ACCESS_STORAGE_WRITE))),
+                     KEPT("use", reads("hits", ACCESS_STORAGE_READ))),
+              IMPORTS({"tlas", STRUCTURE, ACCESS_NONE, ACCESS_NONE}));
+    const frame_graph_plan *const plan = compile(input);
+    const VkPipelineStageFlags2 stage = VK_PIPELINE_STAGE_2_RAY_TRACING_SHADER_BIT_KHR;
+    CHECK(barrier_of(plan, input, "trace", "rays").source_stages == COMPUTE_STAGE);
+    CHECK(barrier_of(plan, input, "trace", "rays").destination_stages == stage);
+    CHECK(barrier_of(plan, input, "trace", "scene").destination_stages == stage);
+    CHECK(barrier_of(plan, input, "use", "hits").source_stages == stage);
+    CHECK(barrier_of(plan, input, "use", "hits").source_mask == VK_ACCESS_2_SHADER_STORAGE_WRITE_BIT);
+}
+
 TEST(host_pass_waits_for_the_device_and_the_device_for_it)
 {
     const frame_graph_input *const input =
@@ -1276,6 +1295,7 @@ int main(void)
     RUN(pass_may_use_what_it_makes);
     RUN(depth_that_is_only_tested_stays_readable);
     RUN(acceleration_structure_is_built_before_it_is_traced);
+    RUN(ray_tracing_pass_waits_and_is_waited_for_in_its_own_stage);
     RUN(host_pass_waits_for_the_device_and_the_device_for_it);
     RUN(imports_return_to_their_after_state);
     RUN(import_waits_for_what_was_written_before_the_frame);
