@@ -171,15 +171,6 @@ SHARED_STRUCT(path_step) {
 
 // ---- Virtual point lights
 
-SHARED_STRUCT(vpl) {
-    SHARED_VEC3(position); // world
-    float intensity;       // luminance of `color`; 0: an empty slot
-    SHARED_VEC3(color);    // cd per channel: flux * albedo / pi
-    uint path;
-    SHARED_VEC3(normal);   // unit geometric normal on the lit side
-    uint bounce;           // 0 is the first hit
-} SHARED_END(vpl, 48)
-
 SHARED_STRUCT(vpl_share) { // what a light path stands for
     uint source; // index into the vpl_sources
     uint index;  // among the source's paths
@@ -201,6 +192,15 @@ SHARED_STRUCT(vpl_box) { // where surfaces changed, world
     SHARED_VEC3(low);
     SHARED_VEC3(high);
 } SHARED_END(vpl_box, 24)
+
+SHARED_STRUCT(vpl) {
+    SHARED_VEC3(position); // world
+    float intensity;       // luminance of `color`; 0: an empty slot
+    SHARED_VEC3(color);    // cd per channel: flux * albedo / pi
+    uint path;
+    SHARED_VEC3(normal);   // unit geometric normal on the lit side
+    uint bounce;           // 0 is the first hit
+} SHARED_END(vpl, 48)
 
 // ---- The lighting grid hierarchy. Resolution exponent c: 2^c cells along the longest edge; level l of L has c = L - l.
 
