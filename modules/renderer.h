@@ -43,7 +43,9 @@
 //   rays_vpl, rays_direct, rays_shadow, rays_path  uint   of this frame, counted by the pass that makes them
 //   X_origins, X_directions, X_visible, X_hits     buffers  batches of rays and their answers; see rays.h
 //   X_estimates        vec3[rays]    the light that each ray of a batch brings, if nothing is in its way  light_rays
-//   vpl_flux           vec3[paths]   of the light paths at their last hit                             vpl_trace
+//   vpl_flux           vec3[paths]   of the traced light paths at their last hit                      vpl_trace
+//   vpl_changed        uint[]        a bit a slot, where not all VPLs are traced anew; see vpl_trace.h  vpl_trace
+//   vpl_mask, vpl_list bits and numbers of the paths that are; vpl_shares, vpl_sources, vpl_elements: see shaders/shared.h
 #pragma once
 
 #include "engine/ecs.h"

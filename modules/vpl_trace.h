@@ -10,5 +10,5 @@ typedef enum vpl_change {
     VPLS_NONE, // no slot changed: `vpls` holds the bits of the last frame, nothing was traced
 } vpl_change;
 
-// Of the current frame; known once the world's extraction has run, so in every pass's setup.
+// Of the current frame; known in the setup of every pass after vpl_trace. VPLS_ALL where there are no VPLs.
 vpl_change vpl_trace_change(const renderer *r);

@@ -1,4 +1,5 @@
-// The scene as entities, and what is extracted from them every frame: transforms, instances, bounds.
+// The scene as entities, and what is extracted from them every frame: transforms, instances, bounds, and what of it
+// changed.
 #include "world.h"
 
 #include <float.h>
@@ -9,10 +10,17 @@
 #define CGLM_FORCE_DEPTH_ZERO_TO_ONE
 #include <cglm/cglm.h>
 
+typedef struct placed_box { // what an instance covers
+    world_instance instance;
+    box box; // world
+} placed_box;
+
 struct world_state {
     world_instance *listed; // instance_count instances as the entities came, of the last frame
     world_instance *found; // of this frame
-    size_t listed_capacity, found_capacity, order_capacity, data_capacity;
+    size_t listed_capacity, found_capacity, order_capacity, data_capacity, boxes_capacity, changed_capacity;
+    placed_box *boxes; // of the instances, parallel to world_gpu's order
+    box *changed; // what world_changes lists
     bool *mesh_emits; // per mesh
 };
 
@@ -333,15 +341,102 @@ static bool instances_write(renderer *r, bool *emitter_moved)
     return true;
 }
 
+// ---- Changes
+
+static void changed_add(world_gpu *w, const box *b)
+{
+    memory_reserve((void **)&w->state->changed, &w->state->changed_capacity, w->changes.box_count + 1, sizeof *b);
+    w->state->changed[w->changes.box_count++] = *b;
+    w->changes.boxes = w->state->changed;
+}
+
+static int placed_box_compare(const void *left, const void *right)
+{
+    const world_instance *a = &((const placed_box *)left)->instance, *b = &((const placed_box *)right)->instance;
+    return a->entity.id != b->entity.id ? (a->entity.id < b->entity.id ? -1 : 1)
+                                        : (a->mesh > b->mesh) - (a->mesh < b->mesh);
+}
+
+// Lists what only one of the two lists has. Sorts both.
+static void boxes_compare(world_gpu *w, placed_box *last, uint32_t last_count, placed_box *now, uint32_t now_count)
+{
+    qsort(last, last_count, sizeof *last, placed_box_compare);
+    qsort(now, now_count, sizeof *now, placed_box_compare);
+    for (uint32_t i = 0, k = 0; i < last_count || k < now_count;) {
+        const int order = i == last_count ? 1 : k == now_count ? -1 : placed_box_compare(&last[i], &now[k]);
+        if (order < 0)
+            changed_add(w, &last[i].box);
+        if (order > 0)
+            changed_add(w, &now[k].box);
+        i += order <= 0;
+        k += order >= 0;
+    }
+}
+
+static box instance_box(const renderer *r, const world_instance *instance)
+{
+    box b = box_empty;
+    box_add_instance(r, &b, instance);
+    return b;
+}
+
+// The boxes of this frame's instances where others than in the last frame are listed.
+static void boxes_make(renderer *r, uint32_t last_count)
+{
+    world_gpu *w = r->gpu_world;
+    struct world_state *state = w->state;
+    placed_box *last = memory_alloc(max_u32(last_count, 1) * sizeof *last);
+    placed_box *now = memory_alloc(max_u32(w->instance_count, 1) * sizeof *now);
+    if (last_count > 0)
+        memcpy(last, state->boxes, last_count * sizeof *last);
+    memory_reserve((void **)&state->boxes, &state->boxes_capacity, w->instance_count, sizeof *state->boxes);
+    for (uint32_t i = 0; i < w->instance_count; i++)
+        state->boxes[i] = now[i] = (placed_box){w->order[i], instance_box(r, &w->order[i])};
+    boxes_compare(w, last, last_count, now, w->instance_count);
+    free(last);
+    free(now);
+}
+
+// Before and after, of the instances that moved.
+static void boxes_move(renderer *r)
+{
+    world_gpu *w = r->gpu_world;
+    for (uint32_t i = 0; i < w->instance_count; i++) {
+        if (!instance_moved(&w->instance_data[i]))
+            continue;
+        const transform_component *transform = ecs_get(r->world, w->order[i].entity, w->transform);
+        const scene_mesh *mesh = &r->scene->meshes[w->order[i].mesh];
+        box before = box_empty;
+        for (uint32_t k = 0; k < mesh->primitive_count; k++)
+            box_add_transformed(&before, &w->primitive_boxes[mesh->first_primitive + k], transform->previous_world);
+        changed_add(w, &before);
+        w->state->boxes[i].box = instance_box(r, &w->order[i]);
+        changed_add(w, &w->state->boxes[i].box);
+    }
+}
+
+// `listed`: others than the `last_count` instances of the last frame are listed.
+static void boxes_extract(renderer *r, bool listed, uint32_t last_count)
+{
+    r->gpu_world->changes.box_count = 0;
+    if (listed)
+        boxes_make(r, last_count);
+    boxes_move(r);
+}
+
 static void bounds_extract(renderer *r)
 {
-    const world_gpu *w = r->gpu_world;
+    world_gpu *w = r->gpu_world;
     box b = box_empty;
-    for (uint32_t i = 0; i < w->instance_count; i++)
-        box_add_instance(r, &b, &w->order[i]);
+    for (uint32_t i = 0; i < w->instance_count; i++) {
+        box_add_point(&b, w->state->boxes[i].box.min);
+        box_add_point(&b, w->state->boxes[i].box.max);
+    }
     if (b.min[0] > b.max[0])
         b = (box){0};
     frame_constants *c = &r->constants;
+    w->changes.bounds = r->frame == 0 || memcmp(c->scene_min, b.min, sizeof b.min) != 0 ||
+                        memcmp(c->scene_max, b.max, sizeof b.max) != 0;
     memcpy(c->scene_min, b.min, sizeof b.min);
     memcpy(c->scene_max, b.max, sizeof b.max);
     c->scene_radius = fmaxf(0.5f * glm_vec3_distance(b.min, b.max), FLT_MIN);
@@ -351,13 +446,15 @@ static void world_extract(ecs_world *world, void *user)
 {
     (void)world;
     renderer *r = user;
-    const bool changed = instances_find(r);
-    if (changed)
+    const uint32_t last_count = r->gpu_world->instance_count;
+    const bool listed = instances_find(r);
+    if (listed)
         instances_order(r);
-    bool emitter_moved = changed;
+    bool emitter_moved = listed;
     r->failed |= !instances_write(r, &emitter_moved);
     if (r->failed)
         return;
+    boxes_extract(r, listed, last_count);
     bounds_extract(r);
     r->failed |= !world_lights_extract(r, emitter_moved);
 }
@@ -428,6 +525,8 @@ void world_fini(renderer *r)
     free(w->instance_data);
     free(w->state->listed);
     free(w->state->found);
+    free(w->state->boxes);
+    free(w->state->changed);
     free(w->state->mesh_emits);
     free(w->state);
     free(w);

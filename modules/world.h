@@ -28,6 +28,24 @@ typedef struct box {
     float min[3], max[3]; // min > max: empty
 } box;
 
+// What gives light: a punctual light, or all emissive triangles of one instance. Its elements are numbered through the
+// punctual lights and, after them, the emissive triangles.
+typedef struct world_source {
+    entity entity;
+    bool emissive; // the emissive triangles of its instance; false: its punctual light
+    bool changed; // is new or sends other light than in the last frame
+    uint32_t first, count; // elements
+    float power; // as world_element_power, their sum
+} world_source;
+
+// What is not as it was in the last frame; all of it in the first. Geometry, materials and textures never change.
+typedef struct world_changes {
+    bool bounds; // the constants' scene_min, scene_max and scene_radius
+    bool sources; // one changed, came, went or was numbered anew
+    const box *boxes; // world: what the instances that moved, came or went cover, and what they covered
+    uint32_t box_count;
+} world_changes;
+
 // An instance by name; its data for the GPU has the same index in `instance_data`.
 typedef struct world_instance {
     entity entity;
@@ -45,6 +63,9 @@ typedef struct world_gpu {
     uint32_t texture_count;
     uint32_t instance_count; // this frame's
     uint32_t instance_max; // for which there is room in the buffers; grows
+    const world_source *sources; // this frame's, by kind and entity
+    uint32_t source_count;
+    world_changes changes; // of this frame
     float light_power; // of all sources: luminous flux in lumen-like units (watts of luminance); 0: no light at all
 
     // What the CPU knows of the scene. Instances are ordered by recursive median split over their centres, for drivers
@@ -63,10 +84,13 @@ void world_fini(renderer *r);
 // Adds a directional light entity that travels along `direction` with `lux` (white).
 entity world_sun_add(renderer *r, const float direction[3], float lux);
 
+// Luminous flux of a light source's element, as `light_power`.
+float world_element_power(const renderer *r, uint32_t element);
+
 // ---- Between the world's files.
 bool world_upload(renderer *r); // world_upload.c: what never changes
 // world_lights.c: punctual lights, emissive triangles and the choice among them. Emitters are gathered anew when
-// `moved`, that is when an instance with an emissive material moved, came or went.
+// `moved`, that is when an instance with an emissive material moved, or any instance came or went.
 bool world_lights_init(renderer *r);
 bool world_lights_extract(renderer *r, bool moved);
 void world_lights_fini(renderer *r);

@@ -10,12 +10,30 @@
 #define CGLM_FORCE_DEPTH_ZERO_TO_ONE
 #include <cglm/cglm.h>
 
+typedef struct punctual_list {
+    punctual_light *lights;
+    float *powers; // of the lights
+    size_t light_capacity, power_capacity;
+} punctual_list;
+
+typedef struct emitter_list {
+    emissive_triangle *triangles;
+    float *powers; // of the triangles
+    size_t triangle_capacity, power_capacity;
+} emitter_list;
+
+typedef struct source_list {
+    world_source *sources; // ascending by kind and entity
+    uint32_t count;
+    size_t capacity;
+} source_list;
+
 struct world_lights {
     float (**triangle_emission)[3]; // per primitive with an emissive texture: each triangle's mean, nits; else NULL
-    float *light_powers; // of the punctual lights
-    float *last_light_powers;
-    float *emitter_powers;
-    size_t light_capacity, last_light_capacity, emitter_capacity;
+    // Each with that of the last frame. Emitters change places when they are gathered anew only.
+    punctual_list punctual, last_punctual;
+    emitter_list emitters, last_emitters;
+    source_list sources, last_sources;
 };
 
 static float luminance(const float color[3])
@@ -159,25 +177,32 @@ static bool emitters_gather(renderer *r)
 {
     const scene_data *s = r->scene;
     world_gpu *w = r->gpu_world;
+    struct world_lights *state = w->light_state;
+    const emitter_list last = state->last_emitters;
+    state->last_emitters = state->emitters;
+    state->emitters = last;
     size_t limit = 0;
     for (uint32_t i = 0; i < w->instance_count; i++)
         for (uint32_t k = 0; k < w->instance_data[i].primitive_count; k++) {
             const mesh_primitive *p = &s->primitives[w->instance_data[i].first_primitive + k];
             limit += world_material_emits(r, p->material) ? p->index_count / 3 : 0;
         }
-    struct world_lights *state = w->light_state;
-    memory_reserve((void **)&state->emitter_powers, &state->emitter_capacity, limit, sizeof *state->emitter_powers);
-    emissive_triangle *emitters =
-        world_buffer_reserve(r, &w->emitters, "emitters", SCENE_EMITTERS, limit * sizeof *emitters);
-    if (!emitters)
+    emitter_list *list = &state->emitters;
+    memory_reserve((void **)&list->powers, &list->power_capacity, limit, sizeof *list->powers);
+    memory_reserve((void **)&list->triangles, &list->triangle_capacity, limit, sizeof *list->triangles);
+    emissive_triangle *mapped =
+        world_buffer_reserve(r, &w->emitters, "emitters", SCENE_EMITTERS, limit * sizeof *mapped);
+    if (!mapped)
         return false;
     uint32_t count = 0;
     for (uint32_t i = 0; i < w->instance_count; i++)
         for (uint32_t k = 0; k < w->instance_data[i].primitive_count; k++) {
             const uint32_t primitive = w->instance_data[i].first_primitive + k;
             if (world_material_emits(r, s->primitives[primitive].material))
-                count += emitters_append(r, i, k, emitters + count, state->emitter_powers + count);
+                count += emitters_append(r, i, k, list->triangles + count, list->powers + count);
         }
+    if (count > 0)
+        memcpy(mapped, list->triangles, count * sizeof *mapped);
     r->constants.emitter_count = count;
     return true;
 }
@@ -229,14 +254,21 @@ static float light_power(const frame_constants *c, const light_component *light,
     return 0;
 }
 
+// Gathers the lights, each with a source of its own at the start of this frame's sources.
 static bool lights_gather(renderer *r)
 {
     world_gpu *w = r->gpu_world;
     struct world_lights *state = w->light_state;
+    const punctual_list last = state->last_punctual;
+    state->last_punctual = state->punctual;
+    state->punctual = last;
+    punctual_list *list = &state->punctual;
     const size_t limit = ecs_count(r->world, w->light);
-    memory_reserve((void **)&state->light_powers, &state->light_capacity, limit, sizeof *state->light_powers);
-    punctual_light *lights = world_buffer_reserve(r, &w->lights, "lights", SCENE_LIGHTS, limit * sizeof *lights);
-    if (!lights)
+    memory_reserve((void **)&list->lights, &list->light_capacity, limit, sizeof *list->lights);
+    memory_reserve((void **)&list->powers, &list->power_capacity, limit, sizeof *list->powers);
+    memory_reserve((void **)&state->sources.sources, &state->sources.capacity, limit, sizeof(world_source));
+    punctual_light *mapped = world_buffer_reserve(r, &w->lights, "lights", SCENE_LIGHTS, limit * sizeof *mapped);
+    if (!mapped)
         return false;
     uint32_t count = 0;
     for (ecs_iterator it = ecs_iterate(r->world, w->light); ecs_next(&it);) {
@@ -244,12 +276,97 @@ static bool lights_gather(renderer *r)
         const transform_component *transform = ecs_get(r->world, it.entity, w->transform);
         if (!transform)
             continue;
-        const punctual_light made = light_make(light, transform->world);
-        state->light_powers[count] = light_power(&r->constants, light, &made);
-        lights[count++] = made;
+        list->lights[count] = light_make(light, transform->world);
+        list->powers[count] = light_power(&r->constants, light, &list->lights[count]);
+        state->sources.sources[count] =
+            (world_source){.entity = it.entity, .first = count, .count = 1, .power = list->powers[count]};
+        count++;
     }
-    r->constants.light_count = count;
+    if (count > 0)
+        memcpy(mapped, list->lights, count * sizeof *mapped);
+    r->constants.light_count = state->sources.count = count;
     return true;
+}
+
+// ---- Sources
+
+// The triangles of an instance lie together.
+static void emissive_sources_append(const renderer *r)
+{
+    const world_gpu *w = r->gpu_world;
+    struct world_lights *state = w->light_state;
+    source_list *list = &state->sources;
+    const emitter_list *emitters = &state->emitters;
+    const uint32_t lights = r->constants.light_count, count = r->constants.emitter_count;
+    for (uint32_t begin = 0, end; begin < count; begin = end) {
+        const uint32_t instance = emitters->triangles[begin].instance;
+        double power = 0;
+        for (end = begin; end < count && emitters->triangles[end].instance == instance; end++)
+            power += (double)emitters->powers[end];
+        memory_reserve((void **)&list->sources, &list->capacity, list->count + 1, sizeof(world_source));
+        list->sources[list->count++] = (world_source){.entity = w->order[instance].entity,
+                                                      .emissive = true,
+                                                      .first = lights + begin,
+                                                      .count = end - begin,
+                                                      .power = (float)power};
+    }
+}
+
+static int source_compare(const void *left, const void *right)
+{
+    const world_source *a = left, *b = right;
+    return a->emissive != b->emissive ? (a->emissive ? 1 : -1)
+                                      : (a->entity.id > b->entity.id) - (a->entity.id < b->entity.id);
+}
+
+static bool triangles_equal(const emissive_triangle *a, const emissive_triangle *b, uint32_t count)
+{
+    for (uint32_t i = 0; i < count; i++) {
+        emissive_triangle same_place = a[i];
+        same_place.instance = b[i].instance; // where the instance is listed does not matter
+        if (memcmp(&same_place, &b[i], sizeof same_place) != 0)
+            return false;
+    }
+    return true;
+}
+
+// Whether the source sends what it did as `last`. `gathered`: there are last frame's emitters to compare with.
+static bool source_is_same(const renderer *r, const world_source *source, const world_source *last,
+                           uint32_t last_lights, bool gathered)
+{
+    const struct world_lights *state = r->gpu_world->light_state;
+    if (source->count != last->count || source->power != last->power)
+        return false;
+    if (!source->emissive)
+        return memcmp(&state->punctual.lights[source->first], &state->last_punctual.lights[last->first],
+                      sizeof(punctual_light)) == 0;
+    return !gathered || triangles_equal(&state->emitters.triangles[source->first - r->constants.light_count],
+                                        &state->last_emitters.triangles[last->first - last_lights], source->count);
+}
+
+// Marks the sources that changed; true when one did, came, went or was numbered anew. Both lists are sorted.
+static bool sources_compare(const renderer *r, uint32_t last_lights, bool gathered)
+{
+    const struct world_lights *state = r->gpu_world->light_state;
+    const source_list *now = &state->sources, *last = &state->last_sources;
+    bool changed = now->count != last->count;
+    uint32_t k = 0;
+    for (uint32_t i = 0; i < now->count; i++) {
+        world_source *source = &now->sources[i];
+        while (k < last->count && source_compare(&last->sources[k], source) < 0)
+            k++;
+        const bool is_new = k == last->count || source_compare(&last->sources[k], source) != 0;
+        source->changed = is_new || !source_is_same(r, source, &last->sources[k], last_lights, gathered);
+        changed |= source->changed || source->first != last->sources[k].first;
+    }
+    return changed;
+}
+
+float world_element_power(const renderer *r, uint32_t element)
+{
+    const struct world_lights *state = r->gpu_world->light_state;
+    const uint32_t lights = r->constants.light_count;
+    return element < lights ? state->punctual.powers[element] : state->emitters.powers[element - lights];
 }
 
 // ---- The choice among them
@@ -258,46 +375,39 @@ static bool lights_gather(renderer *r)
 static bool distribution_write(renderer *r)
 {
     world_gpu *w = r->gpu_world;
-    const struct world_lights *state = w->light_state;
-    const uint32_t lights = r->constants.light_count, emitters = r->constants.emitter_count;
-    const VkDeviceSize size = ((VkDeviceSize)lights + emitters) * sizeof(float);
-    float *cdf = world_buffer_reserve(r, &w->light_cdf, "light cdf", SCENE_LIGHT_CDF, size);
+    const uint32_t elements = r->constants.light_count + r->constants.emitter_count;
+    float *cdf = world_buffer_reserve(r, &w->light_cdf, "light cdf", SCENE_LIGHT_CDF, elements * sizeof(float));
     if (!cdf)
         return false;
     double total = 0;
-    for (uint32_t i = 0; i < lights; i++)
-        total += state->light_powers[i];
-    for (uint32_t i = 0; i < emitters; i++)
-        total += state->emitter_powers[i];
+    for (uint32_t i = 0; i < elements; i++)
+        total += (double)world_element_power(r, i);
     w->light_power = (float)total;
     const double scale = total > 0 ? total : 1;
     double sum = 0; // added in the same order as `total`, so that the last is 1
-    for (uint32_t i = 0; i < lights; i++) {
-        sum += state->light_powers[i];
+    for (uint32_t i = 0; i < elements; i++) {
+        sum += (double)world_element_power(r, i);
         cdf[i] = (float)(sum / scale);
-    }
-    for (uint32_t i = 0; i < emitters; i++) {
-        sum += state->emitter_powers[i];
-        cdf[lights + i] = (float)(sum / scale);
     }
     return true;
 }
 
 bool world_lights_extract(renderer *r, bool moved)
 {
-    struct world_lights *state = r->gpu_world->light_state;
-    const uint32_t last_count = r->constants.light_count;
+    world_gpu *w = r->gpu_world;
+    struct world_lights *state = w->light_state;
+    const uint32_t last_lights = r->constants.light_count;
+    const source_list last = state->last_sources;
+    state->last_sources = state->sources;
+    state->sources = last;
     if ((moved && !emitters_gather(r)) || !lights_gather(r))
         return false;
-    const uint32_t count = r->constants.light_count;
-    const size_t size = count * sizeof *state->light_powers;
-    if (!moved && count == last_count &&
-        (count == 0 || memcmp(state->light_powers, state->last_light_powers, size) == 0))
-        return true;
-    memory_reserve((void **)&state->last_light_powers, &state->last_light_capacity, count, sizeof(float));
-    if (count > 0)
-        memcpy(state->last_light_powers, state->light_powers, size);
-    return distribution_write(r);
+    emissive_sources_append(r);
+    qsort(state->sources.sources, state->sources.count, sizeof(world_source), source_compare);
+    w->changes.sources = sources_compare(r, last_lights, moved);
+    w->sources = state->sources.sources;
+    w->source_count = state->sources.count;
+    return !w->changes.sources || distribution_write(r);
 }
 
 // ---- Life
@@ -320,8 +430,15 @@ void world_lights_fini(renderer *r)
     for (uint32_t i = 0; i < r->scene->primitive_count; i++)
         free(state->triangle_emission[i]);
     free(state->triangle_emission);
-    free(state->light_powers);
-    free(state->last_light_powers);
-    free(state->emitter_powers);
+    const punctual_list *punctual[] = {&state->punctual, &state->last_punctual};
+    const emitter_list *emitters[] = {&state->emitters, &state->last_emitters};
+    for (size_t i = 0; i < 2; i++) {
+        free(punctual[i]->lights);
+        free(punctual[i]->powers);
+        free(emitters[i]->triangles);
+        free(emitters[i]->powers);
+    }
+    free(state->sources.sources);
+    free(state->last_sources.sources);
     free(state);
 }

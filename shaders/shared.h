@@ -171,6 +171,28 @@ SHARED_STRUCT(path_step) {
 
 // ---- Virtual point lights
 
+SHARED_STRUCT(vpl_share) { // what a light path stands for
+    uint source; // index into the vpl_sources
+    uint index;  // among the source's paths
+} SHARED_END(vpl_share, 8)
+
+SHARED_STRUCT(vpl_source) { // one light source, or several among which its paths choose by power
+    uint first, count; // vpl_elements; none: its paths are not launched
+    uint paths;        // each has 1 / paths of the flux
+    uint key;          // scrambles the paths' sequence
+    uint changed;      // 1: all of its paths are traced anew
+} SHARED_END(vpl_source, 20)
+
+SHARED_STRUCT(vpl_element) {
+    uint light; // punctual light, or light_count + emissive triangle
+    float cdf;  // inclusive sum of the probabilities within the source, the last is 1
+} SHARED_END(vpl_element, 8)
+
+SHARED_STRUCT(vpl_box) { // where surfaces changed, world
+    SHARED_VEC3(low);
+    SHARED_VEC3(high);
+} SHARED_END(vpl_box, 24)
+
 SHARED_STRUCT(vpl) {
     SHARED_VEC3(position); // world
     float intensity;       // luminance of `color`; 0: an empty slot

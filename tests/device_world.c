@@ -241,6 +241,58 @@ TEST(lights_share_the_choice_in_proportion_to_power)
     renderer_destroy(r);
 }
 
+// Of the changed sources, by their kind.
+static void check_changed_sources(const renderer *r, uint32_t punctual, uint32_t emissive)
+{
+    uint32_t counts[2] = {0};
+    for (uint32_t i = 0; i < r->gpu_world->source_count; i++)
+        counts[r->gpu_world->sources[i].emissive] += r->gpu_world->sources[i].changed;
+    CHECK(counts[0] == punctual && counts[1] == emissive);
+}
+
+TEST(changes_are_what_changed)
+{
+    quad_scene s;
+    quad_scene_init(&s);
+    float matrix[16];
+    matrix_at(matrix, 100, 100, 100);
+    emissive_quad_add(&s, matrix, 1);
+    matrix_at(matrix, -100, -100, -100);
+    quad_add(&s, matrix);
+    quad_add(&s, IDENTITY);
+    renderer *r = renderer_of(&s);
+    const world_changes *changes = &r->gpu_world->changes;
+    const float down[3] = {0, 0, -2};
+    const entity sun = world_sun_add(r, down, 3);
+    CHECK(renderer_frame(r) && changes->bounds && changes->sources);
+    check_changed_sources(r, 1, 1);
+    CHECK(renderer_frame(r) && !changes->bounds && !changes->sources && changes->box_count == 0);
+    check_changed_sources(r, 0, 0);
+
+    ((light_component *)ecs_get(r->world, sun, r->gpu_world->light))->color[0] = 4;
+    CHECK(renderer_frame(r) && !changes->bounds && changes->sources && changes->box_count == 0);
+    check_changed_sources(r, 1, 0);
+
+    node_of(r, 2)->matrix[12] = 7; // inside the bounds, gives no light
+    CHECK(renderer_frame(r) && !changes->bounds && !changes->sources && changes->box_count == 2);
+    CHECK(changes->boxes[0].min[0] == -1 && changes->boxes[0].max[1] == 1);
+    CHECK(changes->boxes[1].min[0] == 6 && changes->boxes[1].max[0] == 8);
+
+    node_of(r, 0)->matrix[12] = 99;
+    CHECK(renderer_frame(r) && changes->bounds && changes->sources && changes->box_count == 2);
+    check_changed_sources(r, 1, 1); // the sun shines through other bounds, so with other power
+
+    ecs_entity_destroy(r->world, entity_of(r, 2));
+    CHECK(renderer_frame(r) && !changes->bounds && changes->box_count == 1);
+    CHECK(changes->boxes[0].min[0] == 6 && changes->boxes[0].max[0] == 8);
+    check_changed_sources(r, 0, 0);
+
+    ecs_entity_destroy(r->world, sun);
+    CHECK(renderer_frame(r) && changes->sources && changes->box_count == 0);
+    check_changed_sources(r, 0, 0);
+    renderer_destroy(r);
+}
+
 TEST(spots_fall_off_between_their_cones)
 {
     quad_scene s;
@@ -278,6 +330,7 @@ int main(void)
     RUN(textured_emitters_have_their_triangles_mean);
     RUN(emitters_follow_their_instance);
     RUN(lights_share_the_choice_in_proportion_to_power);
+    RUN(changes_are_what_changed);
     RUN(spots_fall_off_between_their_cones);
     RUN(the_validation_layer_is_silent);
     gpu_destroy(device);

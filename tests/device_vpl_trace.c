@@ -1,0 +1,328 @@
+// The VPLs that stay from frame to frame: after any changes to lights and surfaces they are to the bit what tracing all
+// of them makes.
+#include "test.h"
+
+#include "modules/renderer.h"
+#include "modules/vpl_trace.h"
+#include "modules/world.h"
+
+#define SCENES BUILD_DIR "/scenes/"
+
+static gpu *devices[2]; // one for each renderer: a device holds one scene
+
+// ---- Two renderers of one scene, one incremental, that see the same changes
+
+typedef struct pair {
+    scene_data *scene;
+    renderer *kept, *fresh;
+    float power; // of the scene's own lights
+    uint32_t random;
+    entity lights[64], things[64]; // added by the test
+    uint32_t light_count, thing_count;
+    vpl *last; // of `kept`
+} pair;
+
+static renderer *renderer_of(gpu *device, scene_data *scene, const render_settings *settings)
+{
+    renderer *r = scene ? renderer_create(device, scene, settings) : NULL;
+    if (!r) {
+        printf("cannot set up a scene\n");
+        exit(EXIT_FAILURE);
+    }
+    static const char *const names[] = {"vpls|-", "vpl_changed|-", "rays_vpl|-"};
+    for (; r->export_count < countof(names); r->export_count++)
+        r->exports[r->export_count] = names[r->export_count];
+    return r;
+}
+
+static pair pair_create(const char *path, uint32_t rays, uint32_t vpls)
+{
+    render_settings s = render_settings_default();
+    s.width = s.height = 16;
+    s.vpls = vpls;
+    s.rays = rays;
+    pair p = {.scene = scene_load(path), .random = 1};
+    s.incremental = true;
+    p.kept = renderer_of(devices[0], p.scene, &s);
+    s.incremental = false;
+    p.fresh = renderer_of(devices[1], p.scene, &s);
+    p.last = memory_alloc(vpls * sizeof(vpl));
+    return p;
+}
+
+static void pair_destroy(pair *p)
+{
+    renderer_destroy(p->kept);
+    renderer_destroy(p->fresh);
+    scene_destroy(p->scene);
+    free(p->last);
+}
+
+static uint32_t random_below(pair *p, uint32_t end)
+{
+    p->random = p->random * 1664525u + 1013904223u;
+    return (p->random >> 8) % end;
+}
+static float random_float(pair *p) // in [0,1)
+{
+    return (float)random_below(p, 1 << 16) / (1 << 16);
+}
+
+static void point_inside(pair *p, float point[3])
+{
+    const frame_constants *c = &p->kept->constants;
+    for (int k = 0; k < 3; k++)
+        point[k] = c->scene_min[k] + (0.1f + 0.8f * random_float(p)) * (c->scene_max[k] - c->scene_min[k]);
+}
+
+// ---- Changes, made to both
+
+#define BOTH(p, r) for (renderer *r = (p)->kept; r; r = r == (p)->kept ? (p)->fresh : NULL)
+
+static entity node_add(pair *p, const float position[3])
+{
+    entity added = {0};
+    BOTH(p, r)
+    {
+        added = ecs_entity_create(r->world);
+        node_component *node = ecs_add(r->world, added, r->gpu_world->node);
+        for (int k = 0; k < 4; k++)
+            node->matrix[5 * k] = 1;
+        memcpy(node->matrix + 12, position, 3 * sizeof(float));
+    }
+    return added; // both worlds count alike
+}
+
+// `share`: its power, of what the scene had to begin with.
+static void light_set(pair *p, entity e, float share)
+{
+    const float candela = share * p->power / (4 * (float)M_PI);
+    BOTH(p, r)
+    {
+        light_component *light = ecs_add(r->world, e, r->gpu_world->light);
+        *light = (light_component){.type = LIGHT_POINT, .color = {candela, 0.5f * candela, 0.25f * candela}};
+    }
+}
+
+static void light_change(pair *p)
+{
+    float position[3];
+    point_inside(p, position);
+    const uint32_t what = random_below(p, 4);
+    if (what == 0 && p->light_count < countof(p->lights)) {
+        p->lights[p->light_count] = node_add(p, position);
+        light_set(p, p->lights[p->light_count++], 0.01f + 0.2f * random_float(p));
+    } else if (what == 1 && p->light_count > 4) {
+        const uint32_t gone = random_below(p, p->light_count);
+        BOTH(p, r)
+        ecs_entity_destroy(r->world, p->lights[gone]);
+        p->lights[gone] = p->lights[--p->light_count];
+    } else if (what == 2 && p->light_count > 0) {
+        light_set(p, p->lights[random_below(p, p->light_count)], 0.01f + 0.2f * random_float(p));
+    } else if (p->light_count > 0) {
+        const entity e = p->lights[random_below(p, p->light_count)];
+        BOTH(p, r)
+        memcpy(((node_component *)ecs_get(r->world, e, r->gpu_world->node))->matrix + 12, position, sizeof position);
+    }
+}
+
+// A smaller copy of a mesh of the scene appears, moves or goes; the scene's bounds stay.
+static void thing_change(pair *p)
+{
+    float position[3];
+    point_inside(p, position);
+    const uint32_t what = random_below(p, 3);
+    if (p->thing_count == 0 || (what == 0 && p->thing_count < countof(p->things))) {
+        const entity e = p->things[p->thing_count++] = node_add(p, position);
+        const world_instance *like = &p->kept->gpu_world->order[random_below(p, p->kept->gpu_world->instance_count)];
+        const uint32_t mesh = like->mesh;
+        BOTH(p, r)
+        {
+            ((mesh_component *)ecs_add(r->world, e, r->gpu_world->mesh))->mesh = mesh;
+            node_component *node = ecs_get(r->world, e, r->gpu_world->node);
+            node->matrix[0] = node->matrix[5] = node->matrix[10] = 0.03f;
+        }
+    } else if (what == 1) {
+        const uint32_t gone = random_below(p, p->thing_count);
+        BOTH(p, r)
+        ecs_entity_destroy(r->world, p->things[gone]);
+        p->things[gone] = p->things[--p->thing_count];
+    } else {
+        const entity e = p->things[random_below(p, p->thing_count)];
+        BOTH(p, r)
+        {
+            node_component *node = ecs_get(r->world, e, r->gpu_world->node);
+            memcpy(node->matrix + 12, position, sizeof position);
+        }
+    }
+}
+
+// ---- What a frame made
+
+static vpl *vpls_read(renderer *r)
+{
+    const size_t size = r->settings.vpls * sizeof(vpl);
+    vpl *vpls = memory_alloc(size);
+    CHECK(gpu_buffer_read(r->gpu, frame_graph_find_buffer(r->graph, "vpls|-"), 0, vpls, size));
+    return vpls;
+}
+
+static uint32_t rays_of(renderer *r)
+{
+    const gpu_buffer buffer = frame_graph_find_buffer(r->graph, "rays_vpl|-");
+    return buffer.id ? *(const uint32_t *)gpu_buffer_map(r->gpu, buffer) : 0;
+}
+
+// The slots that `changed` leaves out hold what they did. Returns how many it names.
+static uint32_t check_changed(pair *p, const vpl *vpls)
+{
+    const uint32_t slots = p->kept->settings.vpls;
+    const size_t size = div_up_u32(slots, 32) * sizeof(uint32_t);
+    uint32_t *changed = memory_alloc(size), named = 0, unnamed_differ = 0, named_agree = 0;
+    CHECK(gpu_buffer_read(p->kept->gpu, frame_graph_find_buffer(p->kept->graph, "vpl_changed|-"), 0, changed, size));
+    for (uint32_t i = 0; i < slots; i++) {
+        const bool is_named = changed[i / 32] >> (i % 32) & 1, differs = memcmp(&vpls[i], &p->last[i], sizeof(vpl));
+        named += is_named;
+        unnamed_differ += !is_named && differs;
+        named_agree += is_named && !differs;
+    }
+    CHECK(unnamed_differ == 0);
+    CHECK(named_agree == 0);
+    free(changed);
+    return named;
+}
+
+typedef struct tally {
+    uint32_t frames[3]; // by vpl_change
+    uint64_t rays, all_rays; // of the frames with VPLS_SOME: traced, and what tracing all of them takes
+    uint64_t named;
+} tally;
+
+static void frame_check(pair *p, tally *t)
+{
+    CHECK(renderer_frame(p->kept) && renderer_frame(p->fresh));
+    const vpl_change change = vpl_trace_change(p->kept);
+    CHECK(vpl_trace_change(p->fresh) == VPLS_ALL);
+    const size_t size = p->kept->settings.vpls * sizeof(vpl);
+    vpl *kept = vpls_read(p->kept), *fresh = vpls_read(p->fresh);
+    CHECK(memcmp(kept, fresh, size) == 0);
+    CHECK((change != VPLS_NONE || rays_of(p->kept) == 0) && rays_of(p->fresh) > 0);
+    t->frames[change]++;
+    if (change == VPLS_SOME) {
+        t->named += check_changed(p, kept);
+        t->rays += rays_of(p->kept);
+        t->all_rays += rays_of(p->fresh);
+    }
+    memcpy(p->last, kept, size);
+    free(kept);
+    free(fresh);
+}
+
+// ---- Tests
+
+static void check_random_changes(const char *scene, uint32_t rays, uint32_t vpls, uint32_t frames)
+{
+    pair p = pair_create(scene, rays, vpls);
+    tally t = {0};
+    frame_check(&p, &t);
+    p.power = p.kept->gpu_world->light_power;
+    for (uint32_t i = 0; i < 8; i++) { // some of everything to begin with
+        light_change(&p);
+        thing_change(&p);
+    }
+    for (uint32_t frame = 0; frame < frames; frame++) {
+        frame_check(&p, &t);
+        if (frame % 5 != 1)
+            light_change(&p);
+        if (frame % 5 != 1 && frame % 3 != 0)
+            thing_change(&p);
+    }
+    printf("  %s: %u frames all, %u some, %u none; %.3f of the rays, %.0f slots changed a frame\n", scene,
+           t.frames[VPLS_ALL], t.frames[VPLS_SOME], t.frames[VPLS_NONE], (double)t.rays / (double)t.all_rays,
+           (double)t.named / t.frames[VPLS_SOME]);
+    CHECK(t.frames[VPLS_SOME] > frames / 2 && t.frames[VPLS_NONE] >= frames / 5 - 1);
+    CHECK(t.rays < t.all_rays / 2 && t.named > 0);
+    pair_destroy(&p);
+}
+
+TEST(changes_make_what_tracing_everything_makes)
+{
+    check_random_changes(SCENES "atrium.glb", RAYS_QUERY, 3001, 60);
+    check_random_changes(SCENES "atrium.glb", RAYS_AUTO, 20000, 100);
+    check_random_changes(SCENES "two_rooms.glb", RAYS_AUTO, 5000, 60);
+    check_random_changes(SCENES "cornell.glb", RAYS_QUERY, 3000, 60);
+}
+
+TEST(settings_trace_everything_anew)
+{
+    pair p = pair_create(SCENES "cornell.glb", RAYS_AUTO, 2000);
+    tally t = {0};
+    for (uint32_t i = 0; i < 3; i++)
+        frame_check(&p, &t);
+    CHECK(t.frames[VPLS_ALL] == 1 && t.frames[VPLS_NONE] == 2);
+    p.power = p.kept->gpu_world->light_power;
+    BOTH(&p, r)
+    r->settings.seed++;
+    frame_check(&p, &t);
+    BOTH(&p, r)
+    r->settings.bounces = 2;
+    frame_check(&p, &t);
+    BOTH(&p, r)
+    r->settings.only = ONLY_DIRECT; // nothing is traced in between
+    CHECK(renderer_frame(p.kept) && renderer_frame(p.fresh));
+    float position[3];
+    point_inside(&p, position);
+    light_set(&p, node_add(&p, position), 1);
+    CHECK(renderer_frame(p.kept) && renderer_frame(p.fresh));
+    BOTH(&p, r)
+    r->settings.only = ONLY_ALL;
+    frame_check(&p, &t);
+    CHECK(t.frames[VPLS_ALL] == 4);
+    pair_destroy(&p);
+}
+
+// Of the light that moves, the paths; of the others, none.
+TEST(a_light_that_moves_takes_its_own_paths_only)
+{
+    pair p = pair_create(SCENES "cornell.glb", RAYS_AUTO, 9000);
+    tally t = {0};
+    frame_check(&p, &t);
+    p.power = p.kept->gpu_world->light_power;
+    float position[3] = {0};
+    for (uint32_t i = 0; i < 10; i++) {
+        point_inside(&p, position);
+        p.lights[i] = node_add(&p, position);
+        light_set(&p, p.lights[i], 0.1f);
+    }
+    frame_check(&p, &t);
+    t = (tally){0};
+    BOTH(&p, r)
+    ((node_component *)ecs_get(r->world, p.lights[3], r->gpu_world->node))->matrix[12] += 0.01f;
+    frame_check(&p, &t);
+    printf("  one light of 10 and the scene's: %.3f of the rays\n", (double)t.rays / (double)t.all_rays);
+    CHECK(t.frames[VPLS_SOME] == 1 && t.rays * 8 < t.all_rays && t.rays * 40 > t.all_rays);
+    pair_destroy(&p);
+}
+
+TEST(the_validation_layer_has_nothing_to_say)
+{
+    CHECK(gpu_validation_messages(devices[0]) == 0 && gpu_validation_messages(devices[1]) == 0);
+}
+
+int main(void)
+{
+    for (size_t i = 0; i < countof(devices); i++) {
+        devices[i] = gpu_create(&(gpu_desc){.validation = true});
+        if (!devices[i]) {
+            printf("skipped: no usable device\n");
+            return 77;
+        }
+    }
+    RUN(changes_make_what_tracing_everything_makes);
+    RUN(settings_trace_everything_anew);
+    RUN(a_light_that_moves_takes_its_own_paths_only);
+    RUN(the_validation_layer_has_nothing_to_say);
+    for (size_t i = 0; i < countof(devices); i++)
+        gpu_destroy(devices[i]);
+    return test_end();
+}
