@@ -39,7 +39,7 @@ render_settings render_settings_default(void)
         .sample_s1 = true,
         .filter = true,
         .taa = true,
-        .singularity = 0.01f,
+        .singularity = 0.003f,
         .only = ONLY_ALL,
         .seed = 1,
         .auto_exposure = true,

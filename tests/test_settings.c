@@ -42,7 +42,7 @@ TEST(defaults_are_the_documented_ones)
     CHECK(settings.end_point == END_POINT_VPL && settings.build == LGH_BUILD_RESTRICT && settings.s1 == LGH_S1_ORDERED);
     CHECK(settings.reservoirs == RESERVOIRS_EXACT && settings.sampling == SAMPLING_IMPORTANCE);
     CHECK(settings.start_level == 0 && settings.sample_s1 && settings.filter && settings.taa);
-    CHECK_NEAR(settings.singularity, 0.01, 1e-9);
+    CHECK_NEAR(settings.singularity, 0.003, 1e-9);
     CHECK(settings.only == ONLY_ALL && settings.seed == 1 && settings.auto_exposure && settings.frames == 8);
     CHECK(settings.method == METHOD_LGH && settings.rays == RAYS_AUTO);
     CHECK(settings.spp == 64 && settings.until == 0 && settings.ir_vpls == 300);
