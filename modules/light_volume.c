@@ -6,7 +6,7 @@
 
 typedef enum volume_draw { DRAW_TOP, DRAW_MIDDLE, DRAW_FIRST, DRAW_VPLS } volume_draw; // as in light_volume.glsl.h
 
-enum { EXACT = 1, UNIFORM = 2, COUNT = 4, VARIANTS = 8 }; // bits of a pipeline's index
+enum { EXACT = 1, UNIFORM = 2, COUNT = 4, PAPER_BLEND = 8, VARIANTS = 16 }; // bits of a pipeline's index
 
 typedef struct light_volume {
     gpu_pipeline depth;
@@ -27,7 +27,7 @@ static gpu_pipeline pipeline_of(renderer *r, light_volume *state, bool top, uint
     gpu_pipeline *pipeline = &(top ? state->top : state->cube)[variant];
     if (pipeline->id)
         return *pipeline;
-    const uint32_t constants[] = {(variant & EXACT) != 0, (variant & UNIFORM) != 0};
+    const uint32_t constants[] = {(variant & EXACT) != 0, (variant & UNIFORM) != 0, (variant & PAPER_BLEND) != 0};
     const gpu_graphics_pipeline_desc desc = {
         .vertex = top ? &shader_fullscreen_vert : &shader_light_volume_vert,
         .fragment = top ? &shader_light_volume_top_frag : &shader_light_volume_frag,
@@ -172,7 +172,8 @@ static void declare_volumes(renderer *r, light_volume *state, volume_draw draw, 
     const render_settings *s = &r->settings;
     const bool tiled = s->interleave > 1, top = draw == DRAW_TOP, lowest = draw >= DRAW_FIRST;
     const uint32_t variant = (s->reservoirs == RESERVOIRS_EXACT ? EXACT : 0) |
-                             (s->sampling == SAMPLING_UNIFORM ? UNIFORM : 0) | (r->count_lights ? COUNT : 0);
+                             (s->sampling == SAMPLING_UNIFORM ? UNIFORM : 0) | (r->count_lights ? COUNT : 0) |
+                             (s->blend == BLEND_PAPER ? PAPER_BLEND : 0);
     volume_pass pass = {
         .pipeline = pipeline_of(r, state, top, variant),
         .push = {draw, s->interleave, s->emission, s->start_level, samples_of(r), lowest && !s->sample_s1 ? 2 : 1,

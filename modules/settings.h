@@ -13,6 +13,7 @@ typedef enum lgh_build_method { LGH_BUILD_RESTRICT, LGH_BUILD_GATHER, LGH_BUILD_
 typedef enum lgh_s1_method { LGH_S1_ORDERED, LGH_S1_ATOMIC } lgh_s1_method;
 typedef enum end_point { END_POINT_CENTRE, END_POINT_JITTER, END_POINT_VPL } end_point;
 typedef enum reservoir_method { RESERVOIRS_EXACT, RESERVOIRS_UNLOCKED } reservoir_method;
+typedef enum blend_method { BLEND_LATE, BLEND_PAPER } blend_method;
 typedef enum sampling_method { SAMPLING_IMPORTANCE, SAMPLING_UNIFORM } sampling_method;
 
 typedef struct render_settings {
@@ -30,6 +31,7 @@ typedef struct render_settings {
     uint32_t shadow_samples; // reservoirs and shadow rays per pixel, 0 to 8; 0: no indirect shadows
     uint32_t interleave; // 1, 2 or 4
     uint32_t emission; // EMISSION_*
+    uint32_t blend; // where a level gives way to the next: see lgh_blend in shaders/lgh_shade.glsl.h
     uint32_t end_point;
     uint32_t build;
     uint32_t s1;

@@ -4,7 +4,7 @@
 
 #include "lanternfield_renderer_shaders.h"
 
-enum { EXACT = 1, UNIFORM = 2, JITTER = 4, VPL = 8, VARIANTS = 16 }; // bits of a pipeline's index
+enum { EXACT = 1, UNIFORM = 2, JITTER = 4, VPL = 8, PAPER_BLEND = 16, VARIANTS = 32 }; // bits of a pipeline's index
 
 typedef struct shadow {
     gpu_pipeline pipelines[VARIANTS]; // made when first used
@@ -23,7 +23,8 @@ typedef struct shadow_pass {
 static gpu_pipeline pipeline_of(renderer *r, shadow *state, uint32_t variant)
 {
     gpu_pipeline *pipeline = &state->pipelines[variant];
-    const uint32_t constants[] = {(variant & EXACT) != 0, (variant & UNIFORM) != 0, (variant & JITTER) != 0};
+    const uint32_t constants[] = {(variant & EXACT) != 0, (variant & UNIFORM) != 0, (variant & JITTER) != 0,
+                                  (variant & PAPER_BLEND) != 0};
     const gpu_compute_pipeline_desc desc = {
         .shader = variant & VPL ? &shader_shadow_vpl_comp : &shader_shadow_comp,
         .constants = constants,
@@ -70,9 +71,10 @@ static void shadow_setup(renderer *r, void *state)
     if (!renderer_has_shadows(r))
         return;
     const render_settings *s = &r->settings;
-    const uint32_t variant =
-        (s->reservoirs == RESERVOIRS_EXACT ? EXACT : 0) | (s->sampling == SAMPLING_UNIFORM ? UNIFORM : 0) |
-        (s->end_point == END_POINT_JITTER ? JITTER : 0) | (s->end_point == END_POINT_VPL ? VPL : 0);
+    const uint32_t variant = (s->reservoirs == RESERVOIRS_EXACT ? EXACT : 0) |
+                             (s->sampling == SAMPLING_UNIFORM ? UNIFORM : 0) |
+                             (s->end_point == END_POINT_JITTER ? JITTER : 0) |
+                             (s->end_point == END_POINT_VPL ? VPL : 0) | (s->blend == BLEND_PAPER ? PAPER_BLEND : 0);
     const shadow_pass pass = {
         .pipeline = pipeline_of(r, state, variant),
         .width = s->width,

@@ -4,6 +4,7 @@
 
 #include "scene.glsl.h"
 #include "interleave.glsl.h"
+#define LGH_BLEND_CONSTANT 2
 #include "lgh_shade.glsl.h"
 
 layout(set = 0, binding = 0, scalar) readonly buffer header_block { lgh_header header; };

@@ -10,6 +10,7 @@
 #include "light_rays.glsl.h"
 #include "gbuffer.glsl.h"
 #include "interleave.glsl.h"
+#define LGH_BLEND_CONSTANT 3
 #include "lgh_shade.glsl.h"
 #include "reservoir.glsl.h"
 

@@ -177,11 +177,14 @@ static comparison compare_with_brute_force(renderer *r, const float *reference)
 
 // ---- Tests
 
-TEST(blending_functions_sum_to_one)
+// Largest deviation from 1 of the blending functions' sum, over distances, level counts and alphas.
+static double blend_sum_error(blend_method blend)
 {
     enum { COUNT = 4096 };
-    gpu_pipeline pipeline =
-        gpu_compute_pipeline_create(device, &(gpu_compute_pipeline_desc){.shader = &shader_lgh_blend_sum_comp});
+    const uint32_t paper = blend == BLEND_PAPER;
+    gpu_pipeline pipeline = gpu_compute_pipeline_create(
+        device,
+        &(gpu_compute_pipeline_desc){.shader = &shader_lgh_blend_sum_comp, .constants = &paper, .constant_count = 1});
     gpu_buffer buffer =
         gpu_buffer_create(device, &(gpu_buffer_desc){.size = COUNT * 4, .usage = VK_BUFFER_USAGE_STORAGE_BUFFER_BIT});
     static const float alphas[] = {0.5f, 1, 1.7f, 4};
@@ -203,10 +206,16 @@ TEST(blending_functions_sum_to_one)
                 for (int i = 0; i < COUNT; i++)
                     worst = fmax(worst, fabs(sums[i] - 1.0));
             }
-    printf("  worst deviation from 1: %.2e\n", worst);
-    CHECK(worst <= 1e-6);
     gpu_buffer_destroy(device, buffer);
     gpu_pipeline_destroy(device, pipeline);
+    return worst;
+}
+
+TEST(blending_functions_sum_to_one)
+{
+    const double late = blend_sum_error(BLEND_LATE), paper = blend_sum_error(BLEND_PAPER);
+    printf("  worst deviation from 1: %.2e, the papers' %.2e\n", late, paper);
+    CHECK(late <= 1e-6 && paper <= 1e-6);
 }
 
 // Largest relative difference, over levels and channels, between a level's colour sum and the VPLs'.
@@ -353,7 +362,8 @@ TEST(few_and_no_vpls_are_fine)
     }
 }
 
-static void check_error_falls(const char *scene)
+// `ratio`: what the error at alpha 1 is at most, of the paper's settings at more lights per pixel.
+static void check_error_falls(const char *scene, double ratio)
 {
     render_settings s = small_settings(96, 54, 20000);
     s.only = ONLY_INDIRECT_UNSHADOWED;
@@ -371,17 +381,21 @@ static void check_error_falls(const char *scene)
     }
     f.r->settings.alpha = 1;
     f.r->settings.emission = EMISSION_DEMO;
-    const comparison demo = compare_with_brute_force(f.r, reference);
-    printf("  %s, alpha 1, demo: relative L2 %.4f, energy %.4f\n", strrchr(scene, '/') + 1, demo.error, demo.energy);
-    CHECK(errors[1] < 0.6 * demo.error); // measured: 0.48 in cornell, 0.50 in the atrium
+    f.r->settings.blend = BLEND_PAPER;
+    f.r->settings.start_level = 1;
+    f.r->settings.build = LGH_BUILD_GATHER;
+    const comparison paper = compare_with_brute_force(f.r, reference);
+    printf("  %s, alpha 1, the paper's: relative L2 %.4f, energy %.4f\n", strrchr(scene, '/') + 1, paper.error,
+           paper.energy);
+    CHECK(errors[1] < ratio * paper.error);
     free(reference);
     fixture_destroy(&f);
 }
 
 TEST(error_falls_with_alpha)
 {
-    check_error_falls(SCENES "cornell.glb");
-    check_error_falls(SCENES "atrium.glb");
+    check_error_falls(SCENES "cornell.glb", 0.4);
+    check_error_falls(SCENES "atrium.glb", 0.3);
 }
 
 // The mean of an image's red channel.
@@ -408,6 +422,7 @@ TEST(the_furnace_has_its_closed_form)
     fclose(file);
     render_settings s = small_settings(48, 48, 30000);
     s.alpha = 2;
+    s.blend = BLEND_PAPER; // measured here against every VPL: it loses 0.2 % of the light, late blending 1.8 %
     s.bounces = 3;
     s.shadow_samples = 4;
     fixture f = fixture_create(path, NULL, &s);
@@ -464,7 +479,7 @@ TEST(exact_reservoirs_pick_light_i_with_probability_f_i)
     render_settings s = small_settings(WIDTH, HEIGHT, 60);
     s.levels = 2;
     s.shadow_samples = SAMPLES;
-    s.sample_s1 = true;
+    s.start_level = 1; // VPLs have names of their own
     fixture f = fixture_create(SCENES "cornell.glb", NULL, &s);
     selection *pass = renderer_pass_add(f.r, "selection", sizeof *pass, selection_setup, selection_fini);
     pass->pipeline =

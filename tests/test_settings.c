@@ -39,11 +39,10 @@ TEST(defaults_are_the_documented_ones)
     CHECK(settings.width == 1280 && settings.height == 720);
     CHECK(settings.vpls == 100000 && settings.bounces == 3 && settings.alpha == 1 && settings.levels == 0);
     CHECK(settings.shadow_samples == 1 && settings.interleave == 1 && settings.emission == EMISSION_AB);
-    CHECK(settings.end_point == END_POINT_VPL && settings.build == LGH_BUILD_RESTRICT &&
-          settings.s1 == LGH_S1_ORDERED);
+    CHECK(settings.end_point == END_POINT_VPL && settings.build == LGH_BUILD_RESTRICT && settings.s1 == LGH_S1_ORDERED);
     CHECK(settings.reservoirs == RESERVOIRS_EXACT && settings.sampling == SAMPLING_IMPORTANCE);
-    CHECK(settings.start_level == 1 && !settings.sample_s1 && settings.filter && settings.taa);
-    CHECK_NEAR(settings.singularity, 0.01, 1e-9);
+    CHECK(settings.start_level == 0 && settings.sample_s1 && settings.filter && settings.taa);
+    CHECK_NEAR(settings.singularity, 0.003, 1e-9);
     CHECK(settings.only == ONLY_ALL && settings.seed == 1 && settings.auto_exposure && settings.frames == 8);
     CHECK(settings.method == METHOD_LGH && settings.rays == RAYS_AUTO);
     CHECK(settings.spp == 64 && settings.until == 0 && settings.ir_vpls == 300);
@@ -90,7 +89,7 @@ TEST(whole_numbers_keep_to_their_ranges)
     CHECK(set("vpls", "0") && settings.vpls == 0);
     CHECK(set("vpls", "2500000") && settings.vpls == 2500000);
     CHECK(set("seed", "4294967295") && settings.seed == UINT32_MAX);
-    CHECK(set("start-level", "0") && settings.start_level == 0);
+    CHECK(set("start-level", "1") && settings.start_level == 1);
     CHECK(set("shadow-samples", "8") && settings.shadow_samples == 8);
     CHECK(set("bounces", "8") && settings.bounces == 8);
     CHECK(set("frames", "1") && settings.frames == 1);
@@ -119,8 +118,7 @@ TEST(the_references_have_limits_of_their_own)
     CHECK_STRING(error.message, "--method: expected one of lgh, path, vpl, ir, got \"LGH\"");
     CHECK(malformed("rays", "cpu"));
     CHECK_STRING(error.message, "--rays: expected one of auto, query, pipeline, embree, got \"cpu\"");
-    CHECK(set("method", "ir") && settings.method == METHOD_IR && set("rays", "embree") &&
-          settings.rays == RAYS_EMBREE);
+    CHECK(set("method", "ir") && settings.method == METHOD_IR && set("rays", "embree") && settings.rays == RAYS_EMBREE);
 }
 
 TEST(help_says_which_method_a_setting_belongs_to)
@@ -207,9 +205,9 @@ TEST(switches_take_no_value_or_a_truth_value)
     CHECK(set("no-filter", NULL) && !settings.filter);
     CHECK(set("no-filter", "false") && settings.filter);
     CHECK(set("no-taa", "true") && !settings.taa);
-    CHECK(set("sample-s1", NULL) && settings.sample_s1);
-    CHECK(set("sample-s1", "false") && !settings.sample_s1);
-    CHECK(malformed("sample-s1", "1"));
+    CHECK(set("no-sample-s1", NULL) && !settings.sample_s1);
+    CHECK(set("no-sample-s1", "false") && settings.sample_s1);
+    CHECK(malformed("no-sample-s1", "1"));
 }
 
 TEST(an_option_without_its_value_is_refused)

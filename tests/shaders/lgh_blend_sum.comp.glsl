@@ -1,6 +1,7 @@
 // The blending functions of all levels at one distance, summed: distance i of many, for one alpha and level count.
 #version 460
 #extension GL_GOOGLE_include_directive : require
+#define LGH_BLEND_CONSTANT 0
 #include "../../shaders/lgh_shade.glsl.h"
 
 layout(local_size_x = 64) in;
