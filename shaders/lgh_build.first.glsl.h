@@ -12,6 +12,9 @@ layout(set = 0, binding = 3, scalar) readonly buffer order_block { uint order[];
 layout(set = 0, binding = 4, scalar) readonly buffer cell_masks_block { uint cell_masks[]; };
 layout(set = 0, binding = 5, scalar) readonly buffer cell_ranks_block { uint cell_ranks[]; };
 layout(set = 0, binding = 6, scalar) readonly buffer cell_starts_block { uint cell_starts[]; };
+layout(set = 0, binding = 7, scalar) readonly buffer state_block { lgh_state state; };
+layout(set = 0, binding = 8, scalar) readonly buffer dirty_places_block { uint dirty_places[]; };
+layout(constant_id = 0) const bool DIRTY = false; // incremental: only vertices that are to be built again
 
 #include "lgh_cells.glsl.h"
 
@@ -20,9 +23,11 @@ bool first_vertex(out uint place, out uvec3 vertex)
 {
     uint i = gl_WorkGroupID.y * 65535u * 64u + gl_GlobalInvocationID.x;
     uint c = header.level_count - 1u;
-    if (i >= header.levels[c].occupied)
+    if (i >= (DIRTY ? state.dirty[c] : header.levels[c].occupied))
         return false;
     place = header.levels[c].first_light + i;
+    if (DIRTY)
+        place = dirty_places[place];
     vertex = unpack_vertex(vertices[place]);
     return true;
 }

@@ -7,8 +7,8 @@
 layout(push_constant, scalar) uniform push_block { uint step, key; } push;
 #include "lgh_build.coarse.glsl.h"
 
-layout(set = 0, binding = 4, scalar) readonly buffer sums_block { lgh_sums sums[]; };
-layout(set = 0, binding = 5, scalar) writeonly buffer samples_block { uvec4 samples[]; };
+layout(set = 0, binding = 6, scalar) readonly buffer sums_block { lgh_sums sums[]; };
+layout(set = 0, binding = 7, scalar) writeonly buffer samples_block { uvec4 samples[]; };
 
 void main()
 {

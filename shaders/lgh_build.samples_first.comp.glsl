@@ -3,7 +3,7 @@
 #extension GL_GOOGLE_include_directive : require
 #include "lgh_build.first.glsl.h"
 
-layout(set = 0, binding = 7, scalar) writeonly buffer samples_block { uvec4 samples[]; };
+layout(set = 0, binding = 9, scalar) writeonly buffer samples_block { uvec4 samples[]; };
 layout(push_constant, scalar) uniform push_block { uint key; } push;
 
 void main()
