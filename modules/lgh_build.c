@@ -11,7 +11,6 @@
 #include "lgh_build.h"
 #include "lgh_buffers.h"
 #include "modules.h"
-#include "vpl_trace.h"
 
 #include "lanternfield_renderer_shaders.h"
 
@@ -81,6 +80,7 @@ typedef struct lgh_build {
     lgh_signature built; // what the last frame built...
     uint32_t built_frame; // ... and which it was
     bool is_built;
+    vpl_change (*change)(const renderer *r);
     // Of the current frame:
     lgh_signature now;
     uint32_t frame;
@@ -733,7 +733,7 @@ static void lgh_build_setup(renderer *r, void *state)
         r->failed = true;
         return;
     }
-    switch (frame_begin(r, b, vpl_trace_change(r))) {
+    switch (frame_begin(r, b, b->change(r))) {
     case VPLS_NONE:
         lgh_buffers_import(r, &b->buffers);
         b->built_frame = r->frame;
@@ -747,6 +747,12 @@ static void lgh_build_setup(renderer *r, void *state)
     }
     if (!r->failed)
         declare_all(r, b);
+}
+
+void lgh_build_follow(renderer *r, vpl_change (*change)(const renderer *r))
+{
+    const entity pass = renderer_pass_find(r, "lgh_build");
+    ((lgh_build *)((render_pass *)ecs_get(r->world, pass, r->pass))->state)->change = change;
 }
 
 uint32_t lgh_mask_words(uint32_t exponent)
@@ -830,6 +836,7 @@ bool lgh_build_init(renderer *r)
         [SCATTER] = {&shader_lgh_build_scatter_comp, 0},
     };
     lgh_build *b = renderer_pass_add(r, "lgh_build", sizeof *b, lgh_build_setup, lgh_build_fini);
+    b->change = vpl_trace_change;
     for (uint32_t i = 0; i < PIPELINE_COUNT; i++) {
         if (i == SCATTER && !gpu_has_float_atomics(r->gpu))
             continue;
