@@ -523,6 +523,8 @@ static void declare_first(renderer *r, lgh_build *b, const char *pass,
     for (size_t i = 0; i < countof(inputs); i++)
         read(b, p, inputs[i]);
     read_dirty(r, b, p);
+    if (item == LGH_SAMPLES)
+        frame_graph_read(p, "lgh_sums", ACCESS_STORAGE_READ);
     if (b->changed)
         frame_graph_modify(p, moved, name, ACCESS_STORAGE_READ_WRITE);
     else
