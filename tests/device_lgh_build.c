@@ -2,6 +2,7 @@
 //
 //     device_lgh_build                 the tests, with a few hundred changes
 //     device_lgh_build changes N       the first of them with N changes
+//     device_lgh_build hash N          the hash of what is left after N changes
 //     device_lgh_build bench N         milliseconds of a full build over N VPL slots of the atrium, of one with 1 % of
 //     the
 //                                      VPLs changed, and of none
@@ -9,6 +10,8 @@
 
 #include "modules/lgh_build.h"
 #include "modules/renderer.h"
+
+#include <inttypes.h>
 
 #define SCENES BUILD_DIR "/scenes/"
 
@@ -415,6 +418,49 @@ TEST(ten_builds_give_the_same_bytes)
     fixture_destroy(&f);
 }
 
+// Of every output (FNV-1a).
+static uint64_t hash_of(const hierarchy *h)
+{
+    uint64_t hash = 0xcbf29ce484222325u;
+    for (size_t i = 0; i < countof(outputs); i++)
+        for (size_t k = 0; k < h->sizes[i]; k++)
+            hash = (hash ^ ((const uint8_t *)h->bytes[i])[k]) * 0x100000001b3u;
+    return hash;
+}
+
+static void print_hash(uint32_t changes)
+{
+    fixture f = given_fixture(5000);
+    for (uint32_t i = 0; i < changes; i++) {
+        change_some(f.vpls);
+        render(&f, VPLS_SOME);
+    }
+    hierarchy h = hierarchy_read(f.r);
+    printf("%016" PRIx64 "\n", hash_of(&h));
+    hierarchy_free(&h);
+    fixture_destroy(&f);
+}
+
+static const char *program;
+
+static void hash_with_threads(int threads, char line[64])
+{
+    char command[512];
+    snprintf(command, sizeof command, "LP_NUM_THREADS=%d '%s' hash 3", threads, program);
+    FILE *pipe = popen(command, "r");
+    CHECK(pipe && fgets(line, 64, pipe) && strlen(line) == 17);
+    CHECK(pipe && pclose(pipe) == 0);
+}
+
+// The environment variable is lavapipe's; on other devices this is two runs.
+TEST(one_thread_and_two_give_the_same_bytes)
+{
+    char one[64] = "", two[64] = "";
+    hash_with_threads(1, one);
+    hash_with_threads(2, two);
+    CHECK(strcmp(one, two) == 0);
+}
+
 TEST(the_validation_layer_has_nothing_to_say)
 {
     CHECK(gpu_validation_messages(device) == 0);
@@ -537,6 +583,7 @@ static void bench(uint32_t slots)
 
 int main(int argc, char **argv)
 {
+    program = argv[0];
     const char *mode = argc == 3 ? argv[1] : "";
     const uint32_t number = argc == 3 ? (uint32_t)strtoul(argv[2], NULL, 10) : 0;
     device = gpu_create(&(gpu_desc){.validation = strcmp(mode, "bench") != 0});
@@ -548,6 +595,10 @@ int main(int argc, char **argv)
         bench(number);
     } else if (strcmp(mode, "changes") == 0) {
         check_changes(5000, number);
+    } else if (strcmp(mode, "hash") == 0) {
+        print_hash(number);
+        gpu_destroy(device);
+        return 0;
     } else {
         RUN(changes_leave_what_a_full_build_would);
         RUN(a_new_grid_and_new_levels_are_built_fully);
@@ -556,6 +607,7 @@ int main(int argc, char **argv)
         RUN(a_small_motion_leaves_the_grid_where_it_is);
         RUN(the_world_grid_is_a_power_of_two_at_a_multiple_of_itself);
         RUN(ten_builds_give_the_same_bytes);
+        RUN(one_thread_and_two_give_the_same_bytes);
         RUN(the_validation_layer_has_nothing_to_say);
     }
     gpu_destroy(device);
