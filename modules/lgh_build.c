@@ -228,7 +228,7 @@ static void execute_choose(const frame_graph_context *context, void *user)
 
 // ---- Vertices and cells
 
-// Ranks of the vertex masks (`cells` 0) or of the cell masks (1).
+// Ranks of the vertex masks (`cells` 0), and the vertices, or of the cell masks (1).
 static void rank_bits(const frame_graph_context *context, const lgh_build *b, uint32_t cells, uint32_t most_words)
 {
     const uint32_t groups = div_up_u32(most_words, LGH_SCAN_WORDS);
@@ -236,14 +236,13 @@ static void rank_bits(const frame_graph_context *context, const lgh_build *b, ui
     by_header(context, b, RANKS_SUM, &cells, sizeof cells, scan);
     // Past the groups that were summed the numbers mean nothing, and are not used.
     dispatch(context, b->pipelines[SCAN], &groups, sizeof groups, 1);
-    by_header(context, b, RANKS, &cells, sizeof cells, scan);
+    by_header(context, b, cells ? RANKS : VERTICES, &cells, sizeof cells, scan);
 }
 
 static void execute_compact(const frame_graph_context *context, void *user)
 {
     const lgh_build *b = user;
     rank_bits(context, b, 0, lgh_mask_words(b->now.exponent));
-    by_header(context, b, VERTICES, NULL, 0, offsetof(lgh_header, word_dispatch[0]));
 }
 
 static void execute_cells(const frame_graph_context *context, void *user)

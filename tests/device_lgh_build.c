@@ -546,7 +546,8 @@ static void bench_change(given *g, const uint32_t *occupied, uint32_t count, boo
 
 static void bench(uint32_t slots)
 {
-    enum { ROUNDS = 25, KINDS = 4 };
+    enum { KINDS = 4 };
+    const int rounds = slots > 200000 ? 7 : 25;
     static const char *const names[KINDS] = {"full", "1 % anywhere", "1 % in one place", "none"};
     const render_settings s = settings_of(slots);
     fixture f = fixture_create(SCENES "atrium.glb", &s);
@@ -565,7 +566,7 @@ static void bench(uint32_t slots)
     }
     slots_upload(g);
     bench_times times[KINDS] = {0};
-    for (int round = -1; round < ROUNDS; round++) // the first warms up
+    for (int round = -1; round < rounds; round++) // the first warms up
         for (int kind = 0; kind < KINDS; kind++) {
             if (kind == 1 || kind == 2)
                 bench_change(g, occupied, count, kind == 2);
