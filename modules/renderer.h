@@ -16,7 +16,8 @@
 //   lgh_header         lgh_header                                                      lgh_build
 //   lgh_lights         grid_light[]  merged, top level first                           lgh_build
 //   lgh_sums           lgh_sums[]    the same order; with lgh_masks, lgh_ranks, lgh_vertices: see shaders/lgh.glsl.h
-//   lgh_samples        uvec4[]       choices on the way from each light to one of its VPLs
+//   lgh_keys, lgh_order  uint[]      the VPLs sorted by cell; with lgh_cell_*: see modules/lgh_buffers.h
+//   lgh_samples        uvec4[]       choices on the way from each light to one of its VPLs; for the `vpl` end points
 //   depth              D32           near/distance, 0 where nothing was drawn          gbuffer
 //   normals            RGBA16_SNORM  octahedral: xy geometric, zw shading, both towards the viewer
 //   albedo             RGBA16_UNORM  linear; a: 1 where something was drawn

@@ -9,17 +9,15 @@ layout(set = 0, binding = 1, scalar) readonly buffer header_block { lgh_header h
 layout(set = 0, binding = 2, scalar) readonly buffer ranks_block { uint ranks[]; };
 layout(set = 0, binding = 4, scalar) readonly buffer keys_block { uint keys[]; };
 layout(set = 0, binding = 5, scalar) writeonly buffer starts_block { uint starts[]; };
-layout(push_constant, scalar) uniform push_block { uint exponent; } push;
 
 void main()
 {
-    uint i = gl_GlobalInvocationID.x;
+    uint i = gl_WorkGroupID.y * 65535u * 64u + gl_GlobalInvocationID.x;
     if (i >= header.vpl_count)
         return;
-    uint shift = 3u * (push.exponent + 1u - header.level_count);
-    uint cell = keys[i] >> shift;
+    uint cell = keys[i];
     uint rank = ranks[cell >> 5] + uint(bitCount(masks[cell >> 5] & ((1u << (cell & 31u)) - 1u)));
-    if (i == 0u || keys[i - 1u] >> shift != cell)
+    if (i == 0u || keys[i - 1u] != cell)
         starts[rank] = i;
     if (i + 1u == header.vpl_count)
         starts[rank + 1u] = header.vpl_count;

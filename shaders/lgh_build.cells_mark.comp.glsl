@@ -7,15 +7,13 @@ layout(local_size_x = 64) in;
 layout(set = 0, binding = 0, scalar) buffer masks_block { uint masks[]; };
 layout(set = 0, binding = 1, scalar) readonly buffer header_block { lgh_header header; };
 layout(set = 0, binding = 4, scalar) readonly buffer keys_block { uint keys[]; };
-layout(push_constant, scalar) uniform push_block { uint exponent; } push;
 
 void main()
 {
-    uint i = gl_GlobalInvocationID.x;
+    uint i = gl_WorkGroupID.y * 65535u * 64u + gl_GlobalInvocationID.x;
     if (i >= header.vpl_count)
         return;
-    uint shift = 3u * (push.exponent + 1u - header.level_count);
-    uint cell = keys[i] >> shift;
-    if (i == 0u || keys[i - 1u] >> shift != cell)
+    uint cell = keys[i];
+    if (i == 0u || keys[i - 1u] != cell)
         atomicOr(masks[cell >> 5], 1u << (cell & 31u));
 }

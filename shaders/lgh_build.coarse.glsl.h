@@ -7,23 +7,31 @@ layout(set = 0, binding = 0, scalar) readonly buffer header_block { lgh_header h
 layout(set = 0, binding = 1, scalar) readonly buffer vertices_block { uint vertices[]; };
 layout(set = 0, binding = 2, scalar) readonly buffer masks_block { uint masks[]; };
 layout(set = 0, binding = 3, scalar) readonly buffer ranks_block { uint ranks[]; };
+layout(set = 0, binding = 4, scalar) readonly buffer state_block { lgh_state state; };
+layout(set = 0, binding = 5, scalar) readonly buffer dirty_places_block { uint dirty_places[]; };
+layout(constant_id = 0) const bool DIRTY = false; // incremental: only vertices that are to be built again
 
 #include "lgh_lookup.glsl.h"
 
-// Exponent of the level that is made, and the place of its vertex i in the merged arrays; false past the last.
+// Exponent of the level that is made, and the place of its vertex i (or dirty vertex i) in the merged arrays; false past
+// the last.
 bool coarse_vertex(uint i, out uint c, out uint place)
 {
     if (push.step >= header.level_count)
         return false;
     c = header.level_count - 1u - push.step;
     place = header.levels[c].first_light + i;
-    return i < header.levels[c].occupied;
+    if (i >= (DIRTY ? state.dirty[c] : header.levels[c].occupied))
+        return false;
+    if (DIRTY)
+        place = dirty_places[place];
+    return true;
 }
 
 // Place of a vertex of exponent c; LGH_NONE where it holds no light, and outside the grid.
 uint place_of(uint c, ivec3 vertex)
 {
-    if (any(lessThan(vertex, ivec3(0))) || any(greaterThan(vertex, ivec3(1 << c))))
+    if (any(lessThan(vertex, ivec3(0))) || any(greaterThan(vertex, ivec3(grid_cells(c)))))
         return LGH_NONE;
     return lookup(c, uvec3(vertex));
 }

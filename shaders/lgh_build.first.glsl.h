@@ -12,6 +12,9 @@ layout(set = 0, binding = 3, scalar) readonly buffer order_block { uint order[];
 layout(set = 0, binding = 4, scalar) readonly buffer cell_masks_block { uint cell_masks[]; };
 layout(set = 0, binding = 5, scalar) readonly buffer cell_ranks_block { uint cell_ranks[]; };
 layout(set = 0, binding = 6, scalar) readonly buffer cell_starts_block { uint cell_starts[]; };
+layout(set = 0, binding = 7, scalar) readonly buffer state_block { lgh_state state; };
+layout(set = 0, binding = 8, scalar) readonly buffer dirty_places_block { uint dirty_places[]; };
+layout(constant_id = 0) const bool DIRTY = false; // incremental: only vertices that are to be built again
 
 #include "lgh_cells.glsl.h"
 
@@ -20,17 +23,42 @@ bool first_vertex(out uint place, out uvec3 vertex)
 {
     uint i = gl_WorkGroupID.y * 65535u * 64u + gl_GlobalInvocationID.x;
     uint c = header.level_count - 1u;
-    if (i >= header.levels[c].occupied)
+    if (i >= (DIRTY ? state.dirty[c] : header.levels[c].occupied))
         return false;
     place = header.levels[c].first_light + i;
+    if (DIRTY)
+        place = dirty_places[place];
     vertex = unpack_vertex(vertices[place]);
     return true;
 }
 
-// Range in the sorted order of the VPLs in one of the eight cells around a vertex of S1.
-uvec2 corner_range(uvec3 vertex, uint corner)
+// A walk over the VPLs in the eight cells around a vertex of S1, in a fixed order. One loop over all of them, as lanes with
+// full and empty cells at different corners would otherwise wait for each other at each.
+struct vpl_walk {
+    uvec2 ranges[8]; // in the sorted order
+    uint corner, next;
+};
+
+vpl_walk walk_begin(uvec3 vertex)
 {
-    return cell_range(ivec3(vertex) - 1 + ivec3(uvec3(corner, corner >> 1, corner >> 2) & 1u));
+    vpl_walk walk;
+    for (uint corner = 0u; corner < 8u; corner++)
+        walk.ranges[corner] = cell_range(ivec3(vertex) - 1 + ivec3(uvec3(corner, corner >> 1, corner >> 2) & 1u));
+    walk.corner = 0u;
+    walk.next = walk.ranges[0].x;
+    return walk;
+}
+
+// The slot of the next VPL; false after the last.
+bool walk_next(inout vpl_walk walk, out uint slot)
+{
+    while (walk.next >= walk.ranges[walk.corner].y) {
+        if (walk.corner == 7u)
+            return false;
+        walk.next = walk.ranges[++walk.corner].x;
+    }
+    slot = order[walk.next++];
+    return true;
 }
 
 // Where a VPL lies relative to a vertex of S1, in cells.

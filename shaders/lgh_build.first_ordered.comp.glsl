@@ -3,7 +3,7 @@
 #extension GL_GOOGLE_include_directive : require
 #include "lgh_build.first.glsl.h"
 
-layout(set = 0, binding = 7, scalar) writeonly buffer sums_block { lgh_sums sums[]; };
+layout(set = 0, binding = 9, scalar) writeonly buffer sums_block { lgh_sums sums[]; };
 layout(push_constant, scalar) uniform push_block { uint demo; } push;
 
 void main()
@@ -14,13 +14,11 @@ void main()
         return;
     float size = header.levels[header.level_count - 1u].cell_size;
     lgh_sums s = sums_zero();
-    for (uint corner = 0u; corner < 8u; corner++) {
-        uvec2 range = corner_range(vertex, corner);
-        for (uint j = range.x; j < range.y; j++) {
-            vpl light = vpls[order[j]];
-            vec3 offset = cell_offset(light, vertex);
-            sums_add(s, sums_of(light, offset * size, trilinear(offset), push.demo != 0u));
-        }
+    uint slot;
+    for (vpl_walk walk = walk_begin(vertex); walk_next(walk, slot);) {
+        vpl light = vpls[slot];
+        vec3 offset = cell_offset(light, vertex);
+        sums_add(s, sums_of(light, offset * size, trilinear(offset), push.demo != 0u));
     }
     sums[place] = s;
 }

@@ -1,28 +1,100 @@
-// Bounds of the VPLs, second half: one invocation joins the partials and lays the grid around them. The top level's cell
-// is the longest edge of the bounds, a little padded (Lin and Yuksel 2019, section 3.1).
+// Bounds of the VPLs, second half: one invocation joins the partials, and keeps last frame's grid or lays a new one.
+//
+// Around the bounds, the top level's cell is their longest edge, a little padded (Lin and Yuksel 2019, section 3.1).
+// Anchored in the world, it is the next power of two and the corner a multiple of it, so that small motions leave the grid
+// alone; it is kept for as long as every VPL lies in it, and the level count with it (see lgh_build.levels.comp.glsl).
 #version 460
 #extension GL_GOOGLE_include_directive : require
-#include "lgh.glsl.h"
-#include "lgh_build.glsl.h"
+#include "lgh_build.state.glsl.h"
 
 layout(local_size_x = 1) in;
+layout(set = 0, binding = 1, scalar) buffer partials_block { lgh_partial partials[]; };
+layout(set = 0, binding = 4, scalar) buffer header_block { lgh_header header; };
+layout(set = 0, binding = 5, scalar) buffer state_block { lgh_state state; };
+layout(push_constant, scalar) uniform push_block {
+    uint partial_count;
+    uint exponent; // finest candidate
+    uint stage;
+    uint history; // 1: header and state are last frame's
+    uint changed; // 1: the partials are of the changed VPLs alone
+    uint world;   // 1: the grid is anchored in the world
+} push;
 
-void main()
+void lay_grid(vec3 low, vec3 high)
 {
-    vec3 low = vec3(1e30), high = vec3(-1e30);
-    uint count = 0u;
-    for (uint i = 0u; i < push.partial_count; i++) {
-        low = min(low, partials[i].low);
-        high = max(high, partials[i].high);
-        count += partials[i].count;
-    }
-    if (count == 0u)
-        low = high = vec3(0.0);
     vec3 extent = high - low;
     float longest = max(max(extent.x, extent.y), extent.z);
     vec3 reach = max(abs(low), abs(high));
     float pad = 1e-4 * longest + 1e-5 * max(max(reach.x, reach.y), reach.z) + 1e-6;
     header.origin = low - pad;
     header.top_size = longest + 2.0 * pad;
-    header.vpl_count = count;
+    if (push.world != 0u) {
+        header.top_size = uintBitsToFloat((floatBitsToUint(header.top_size) + 0x7fffffu) & 0x7f800000u);
+        header.origin = floor(header.origin / header.top_size) * header.top_size;
+    }
+}
+
+bool grid_fits(vec3 low, vec3 high)
+{
+    return all(greaterThanEqual(low, header.origin)) &&
+           all(lessThanEqual(high, header.origin + 2.0 * header.top_size));
+}
+
+// Joins the partials, and gives each the number of VPLs before it.
+lgh_partial join_partials()
+{
+    lgh_partial all = lgh_partial(vec3(1e30), 0u, vec3(-1e30), 0u);
+    for (uint i = 0u; i < push.partial_count; i++) {
+        lgh_partial partial = partials[i];
+        partials[i].count = all.count;
+        all = lgh_partial(min(all.low, partial.low), all.count + partial.count, max(all.high, partial.high),
+                          all.removed + partial.removed);
+    }
+    return all;
+}
+
+void set_dispatches(uint stage)
+{
+    state.once[stage] = dispatch_of(1u);
+    state.stretches[stage] = dispatch_of(push.partial_count);
+    uint levels = stage == 0u ? header.level_count : push.exponent + 1u;
+    state.words[stage] = dispatch_of((LGH_MASK_OFFSET[levels] + 255u) / 256u);
+    state.vpls[stage] = dispatch_of((header.vpl_count + 63u) / 64u);
+}
+
+void clear_dispatches()
+{
+    for (uint stage = 0u; stage < 2u; stage++)
+        state.once[stage] = state.stretches[stage] = state.words[stage] = state.vpls[stage] = dispatch_of(0u);
+    for (uint i = 0u; i < uint(LGH_SORT_PASSES); i++)
+        state.sort[i] = dispatch_of(0u);
+    state.runs = state.cell_words = dispatch_of(0u);
+}
+
+void main()
+{
+    lgh_partial all = join_partials();
+    for (uint c = 0u; c < LGH_EXPONENTS; c++)
+        state.counts[c] = state.dirty[c] = 0u;
+    clear_dispatches();
+    bool changed = push.changed != 0u && push.stage == 0u;
+    state.listed = all.count;
+    state.last_count = changed ? header.vpl_count : 0u;
+    uint count = state.last_count - all.removed + all.count;
+    if (push.stage == 1u || (push.world == 0u && !changed)) {
+        if (count == 0u)
+            all.low = all.high = vec3(0.0);
+        lay_grid(all.low, all.high);
+    }
+    if (push.stage == 0u)
+        state.fresh = push.history == 0u || header.level_count == 0u || count == 0u ||
+                      (all.count > 0u && !grid_fits(all.low, all.high)) ? 1u : 0u;
+    header.vpl_count = push.stage == 0u && state.fresh != 0u ? header.vpl_count : count;
+    set_dispatches(push.stage == 0u ? state.fresh : 1u);
+    if (state.fresh != 0u)
+        return;
+    for (uint i = 0u; i < sort_passes(header.level_count); i++)
+        state.sort[i] = dispatch_of(sort_blocks(state.listed));
+    state.runs = dispatch_of((merge_runs(state.last_count) + 63u) / 64u);
+    state.cell_words = dispatch_of((LGH_CELL_OFFSET[header.level_count] + 255u) / 256u);
 }

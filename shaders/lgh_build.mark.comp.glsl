@@ -1,14 +1,15 @@
-// Marks the vertices around each VPL's cell on every candidate grid, and counts the marks: integers, so the order of the
-// atomics leaves no trace. A VPL whose neighbour in the list shares its cell leaves the marking to it.
+// Marks the vertices around each VPL's cell on every grid, and counts the marks: integers, so the order of the atomics
+// leaves no trace. A VPL whose neighbour in the list shares its cell leaves the marking to it.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "lgh.glsl.h"
 
 layout(local_size_x = 64) in;
-layout(set = 0, binding = 0, scalar) readonly buffer keys_block { uint keys[]; };
-layout(set = 0, binding = 1, scalar) buffer masks_block { uint masks[]; };
-layout(set = 0, binding = 2, scalar) buffer counts_block { uint counts[LGH_EXPONENTS]; };
-layout(push_constant, scalar) uniform push_block { uint slot_count, exponent; } push;
+layout(set = 0, binding = 7, scalar) readonly buffer keys_block { uint keys[]; };
+layout(set = 0, binding = 12, scalar) buffer masks_block { uint masks[]; };
+layout(set = 0, binding = 4, scalar) readonly buffer header_block { lgh_header header; };
+layout(set = 0, binding = 5, scalar) buffer state_block { lgh_state state; };
+layout(push_constant, scalar) uniform push_block { uint finest, stage; } push; // stage 1: keys of the exponent `finest`
 
 shared uint group_counts[LGH_EXPONENTS];
 
@@ -31,13 +32,13 @@ void main()
     if (thread < LGH_EXPONENTS)
         group_counts[thread] = 0u;
     barrier();
-    uint i = gl_GlobalInvocationID.x;
-    uint empty = 1u << 3u * push.exponent;
-    if (i < push.slot_count && keys[i] < empty) {
+    uint i = gl_WorkGroupID.y * 65535u * 64u + gl_GlobalInvocationID.x;
+    uint finest = push.stage != 0u ? push.finest : header.level_count - 1u;
+    if (i < header.vpl_count) {
         uint key = keys[i];
-        uint neighbour = i > 0u ? keys[i - 1u] : empty;
-        for (uint c = push.exponent + 1u; c-- > 0u;) {
-            uint shift = 3u * (push.exponent - c);
+        uint neighbour = i > 0u ? keys[i - 1u] : 0xffffffffu;
+        for (uint c = finest + 1u; c-- > 0u;) {
+            uint shift = 3u * (finest - c);
             if (neighbour >> shift == key >> shift)
                 break; // and so on all coarser grids
             mark_cell(c, morton_decode(key >> shift));
@@ -45,5 +46,5 @@ void main()
     }
     barrier();
     if (thread < LGH_EXPONENTS && group_counts[thread] > 0u)
-        atomicAdd(counts[thread], group_counts[thread]);
+        atomicAdd(state.counts[thread], group_counts[thread]);
 }

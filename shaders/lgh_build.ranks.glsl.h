@@ -1,4 +1,5 @@
-// Ranks of a bit mask: what the steps before and after the scan of the workgroups' sums share.
+// Ranks of a bit mask, the set bits before each word: what the steps before and after the scan of the workgroups' sums
+// share. Each invocation has RUN words.
 #ifndef LGH_BUILD_RANKS_GLSL_H
 #define LGH_BUILD_RANKS_GLSL_H
 
@@ -13,6 +14,8 @@ layout(push_constant, scalar) uniform push_block { uint cells; } push; // 1: the
 
 const uint RUN = LGH_SCAN_WORDS / 256u;
 
+shared uint sums[256];
+
 uint word_count()
 {
     if (push.cells == 0u)
@@ -21,13 +24,32 @@ uint word_count()
 }
 
 uint run_first() { return gl_WorkGroupID.x * LGH_SCAN_WORDS + gl_LocalInvocationIndex * RUN; }
+uint run_last() { return min(run_first() + RUN, word_count()); }
 
 uint run_sum()
 {
     uint sum = 0u;
-    for (uint i = run_first(); i < min(run_first() + RUN, word_count()); i++)
+    for (uint i = run_first(); i < run_last(); i++)
         sum += uint(bitCount(masks[i]));
     return sum;
+}
+
+// The set bits before this invocation's words; `group_sums` holds those before the workgroup's.
+uint run_rank()
+{
+    uint thread = gl_LocalInvocationIndex;
+    sums[thread] = run_sum();
+    barrier();
+    if (thread == 0u) {
+        uint total = group_sums[gl_WorkGroupID.x];
+        for (uint i = 0u; i < 256u; i++) {
+            uint sum = sums[i];
+            sums[i] = total;
+            total += sum;
+        }
+    }
+    barrier();
+    return sums[thread];
 }
 
 #endif

@@ -7,7 +7,7 @@
 layout(push_constant, scalar) uniform push_block { uint step; } push;
 #include "lgh_build.coarse.glsl.h"
 
-layout(set = 0, binding = 4, scalar) buffer sums_block { lgh_sums sums[]; };
+layout(set = 0, binding = 6, scalar) buffer sums_block { lgh_sums sums[]; };
 
 void main()
 {

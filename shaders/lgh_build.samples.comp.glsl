@@ -6,9 +6,10 @@
 
 layout(push_constant, scalar) uniform push_block { uint step, key; } push;
 #include "lgh_build.coarse.glsl.h"
+#include "lgh_build.draw.glsl.h"
 
-layout(set = 0, binding = 4, scalar) readonly buffer sums_block { lgh_sums sums[]; };
-layout(set = 0, binding = 5, scalar) writeonly buffer samples_block { uvec4 samples[]; };
+layout(set = 0, binding = 6, scalar) readonly buffer sums_block { lgh_sums sums[]; };
+layout(set = 0, binding = 7, scalar) writeonly buffer samples_block { uvec4 samples[]; };
 
 void main()
 {
@@ -16,21 +17,12 @@ void main()
     if (!coarse_vertex(gl_WorkGroupID.y * 65535u * 64u + gl_GlobalInvocationID.x, c, place))
         return;
     ivec3 fine_vertex = 2 * ivec3(unpack_vertex(vertices[place]));
-    uint random = hash(push.key, vertices[place], c);
-    uvec4 chosen = uvec4(LGH_NO_SAMPLE);
-    float sum = 0.0;
+    lgh_draws draws = draws_begin(hash(push.key, vertices[place], c), luminance(sums[place].color));
     for (int j = 0; j < 27; j++) {
         ivec3 d = finer_offset(j);
         uint fine = place_of(c + 1u, fine_vertex + d);
-        if (fine == LGH_NONE)
-            continue;
-        float weight = trilinear(0.5 * vec3(d)) * luminance(sums[fine].color);
-        sum += weight;
-        for (uint k = 0u; k < 4u; k++) {
-            random = hash(random);
-            if (unit_float(random) * sum < weight)
-                chosen[k] = fine;
-        }
+        if (fine != LGH_NONE)
+            draws_add(draws, fine, trilinear(0.5 * vec3(d)) * luminance(sums[fine].color));
     }
-    samples[place] = chosen;
+    samples[place] = draws.chosen;
 }

@@ -2,8 +2,10 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "lgh_build.first.glsl.h"
+#include "lgh_build.draw.glsl.h"
 
-layout(set = 0, binding = 7, scalar) writeonly buffer samples_block { uvec4 samples[]; };
+layout(set = 0, binding = 9, scalar) readonly buffer sums_block { lgh_sums sums[]; };
+layout(set = 0, binding = 10, scalar) writeonly buffer samples_block { uvec4 samples[]; };
 layout(push_constant, scalar) uniform push_block { uint key; } push;
 
 void main()
@@ -12,21 +14,9 @@ void main()
     uvec3 vertex;
     if (!first_vertex(place, vertex))
         return;
-    uint random = hash(push.key, vertices[place], header.level_count);
-    uvec4 chosen = uvec4(LGH_NO_SAMPLE);
-    float sum = 0.0;
-    for (uint corner = 0u; corner < 8u; corner++) {
-        uvec2 range = corner_range(vertex, corner);
-        for (uint j = range.x; j < range.y; j++) {
-            vpl light = vpls[order[j]];
-            float weight = trilinear(cell_offset(light, vertex)) * light.intensity;
-            sum += weight;
-            for (uint k = 0u; k < 4u; k++) {
-                random = hash(random);
-                if (unit_float(random) * sum < weight)
-                    chosen[k] = order[j];
-            }
-        }
-    }
-    samples[place] = chosen;
+    lgh_draws draws = draws_begin(hash(push.key, vertices[place], header.level_count), luminance(sums[place].color));
+    uint slot;
+    for (vpl_walk walk = walk_begin(vertex); walk_next(walk, slot);)
+        draws_add(draws, slot, trilinear(cell_offset(vpls[slot], vertex)) * vpls[slot].intensity);
+    samples[place] = draws.chosen;
 }

@@ -6,12 +6,11 @@
 void main()
 {
     uint thread = gl_LocalInvocationIndex;
-    uint first = min(gl_WorkGroupID.x * SORT_BLOCK + thread * SORT_RUN, push.slot_count);
-    count_digits(thread, first, min(first + SORT_RUN, push.slot_count));
-    if (thread < 16u) {
+    count_digits(thread);
+    if (thread < SORT_DIGITS) {
         uint sum = 0u;
         for (uint i = 0u; i < 64u; i++)
             sum += counts[thread * 64u + i];
-        table[thread * push.block_count + gl_WorkGroupID.x] = sum;
+        table[thread * sort_blocks(state.listed) + gl_WorkGroupID.x] = sum;
     }
 }

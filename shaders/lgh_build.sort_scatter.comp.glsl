@@ -6,11 +6,9 @@
 void main()
 {
     uint thread = gl_LocalInvocationIndex;
-    uint first = min(gl_WorkGroupID.x * SORT_BLOCK + thread * SORT_RUN, push.slot_count);
-    uint last = min(first + SORT_RUN, push.slot_count);
-    count_digits(thread, first, last);
-    if (thread < 16u) { // one digit each: from counts to first places
-        uint place = table[thread * push.block_count + gl_WorkGroupID.x];
+    count_digits(thread);
+    if (thread < SORT_DIGITS) { // one digit each: from counts to first places
+        uint place = table[thread * sort_blocks(state.listed) + gl_WorkGroupID.x];
         for (uint i = 0u; i < 64u; i++) {
             uint count = counts[thread * 64u + i];
             counts[thread * 64u + i] = place;
@@ -18,10 +16,10 @@ void main()
         }
     }
     barrier();
-    for (uint i = first; i < last; i++) {
+    for (uint i = run_first(thread); i < run_last(thread); i++) {
         uint key = sort_key(i);
         uint place = counts[sort_digit(key) * 64u + thread]++;
-        if (push.from_swap != 0u) {
+        if (from_swap()) {
             keys[place] = key;
             order[place] = order_swap[i];
         } else {

@@ -5,7 +5,7 @@
 // Range in the sorted order: first, and one past the last. Cells outside the grid are empty.
 uvec2 cell_range(ivec3 cell)
 {
-    int cells = 1 << (header.level_count - 1u);
+    int cells = int(grid_cells(header.level_count - 1u));
     if (any(lessThan(cell, ivec3(0))) || any(greaterThanEqual(cell, ivec3(cells))))
         return uvec2(0u);
     uint code = morton(uvec3(cell));

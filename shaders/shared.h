@@ -202,10 +202,13 @@ SHARED_STRUCT(vpl) {
     uint bounce;           // 0 is the first hit
 } SHARED_END(vpl, 48)
 
-// ---- The lighting grid hierarchy. Resolution exponent c: 2^c cells along the longest edge; level l of L has c = L - l.
+// ---- The lighting grid hierarchy. Resolution exponent c: cells of 1 / 2^c of the top level's; level l of L has c = L - l.
 
-#define LGH_EXPONENTS 10      // candidate exponents 0..9, so at most 10 levels and 512 cells
+#define LGH_EXPONENTS 9       // candidate exponents 0..8, so at most 9 levels and 512 cells along an axis of the grid
 #define LGH_SCAN_WORDS 2048   // mask words that one workgroup scans
+#define LGH_STRETCH 4096      // VPL slots that one workgroup looks through
+#define LGH_SORT_BITS 4       // of the key, in one pass of the sort
+#define LGH_SORT_PASSES 7     // for keys of 3 LGH_EXPONENTS bits
 
 #define EMISSION_DEMO 0u
 #define EMISSION_MEAN_NORMAL 1u
@@ -252,7 +255,7 @@ SHARED_STRUCT(lgh_draw) { // VkDrawIndirectCommand
 } SHARED_END(lgh_draw, 16)
 
 SHARED_STRUCT(lgh_header) {
-    SHARED_VEC3(origin); // corner of the grid, world
+    SHARED_VEC3(origin); // corner of the grid, world; the grid is 2 top_size wide
     float top_size;      // edge of the top level's cell, metres
     uint level_count;    // 0: no light at all
     uint light_count;    // grid lights of all levels
@@ -267,6 +270,33 @@ SHARED_STRUCT(lgh_header) {
     lgh_dispatch gather_dispatch[LGH_EXPONENTS];   // the same by one workgroup per vertex
     lgh_draw volume_draw;       // light volumes of the levels between S1 and the top: 14 vertices an instance
     lgh_draw volume_first_draw; // those of S1, where it is not the top
-} SHARED_END(lgh_header, 32 + 160 + 64 + 32 + 320 + 32)
+} SHARED_END(lgh_header, 32 + 16 * LGH_EXPONENTS + 64 + 32 + 32 * LGH_EXPONENTS + 32)
+
+SHARED_STRUCT(lgh_partial) { // of a stretch of VPL slots
+    SHARED_VEC3(low);  // bounds of its VPLs
+    uint count;        // VPLs; then those before it
+    SHARED_VEC3(high);
+    uint removed;      // incremental: VPLs of last frame that changed
+} SHARED_END(lgh_partial, 32)
+
+// Of lgh_build alone. Stage 0 builds on the last frame's grid and level count; stage 1, when these do not fit any more,
+// starts anew. The dispatches of the stage that does not run are zero.
+SHARED_STRUCT(lgh_state) {
+    float density; // vertices of S1 for each VPL when the level count was chosen; kept from frame to frame
+    uint fresh;    // 1: stage 1 runs
+    uint listed;   // VPLs to sort: all, or in an incremental build those that changed
+    uint last_count; // incremental: length of last frame's sorted list, which they are merged into
+    uint counts[LGH_EXPONENTS]; // marked vertices
+    uint dirty[LGH_EXPONENTS];  // incremental: vertices to build again
+    lgh_dispatch once[2];
+    lgh_dispatch stretches[2]; // LGH_STRETCH slots per workgroup
+    lgh_dispatch words[2];     // vertex masks, 256 words per workgroup
+    lgh_dispatch vpls[2];      // the list of VPLs, 64 per workgroup
+    lgh_dispatch sort[LGH_SORT_PASSES]; // by passes that follow
+    lgh_dispatch cell_words;   // masks of the dirty cells, 256 words per workgroup
+    lgh_dispatch runs;         // of last frame's sorted list, for merging
+    lgh_dispatch list;         // the final sorted list of VPLs, 64 per workgroup
+    lgh_dispatch dirty_dispatch[LGH_EXPONENTS]; // 64 vertices per workgroup
+} SHARED_END(lgh_state, 16 + 8 * LGH_EXPONENTS + 16 * (11 + LGH_SORT_PASSES + LGH_EXPONENTS))
 
 #endif

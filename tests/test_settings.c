@@ -155,9 +155,9 @@ TEST(singularity_is_a_fraction)
 
 TEST(levels_and_exposure_can_be_automatic)
 {
-    CHECK(set("levels", "10") && settings.levels == 10);
+    CHECK(set("levels", "9") && settings.levels == 9);
     CHECK(set("levels", "auto") && settings.levels == 0);
-    CHECK(beyond("levels", "0") && beyond("levels", "11") && malformed("levels", "Auto"));
+    CHECK(beyond("levels", "0") && beyond("levels", "10") && malformed("levels", "Auto"));
     CHECK(set("exposure", "-2.5") && !settings.auto_exposure && settings.exposure == -2.5f);
     CHECK(set("exposure", "auto") && settings.auto_exposure);
     CHECK(beyond("exposure", "65") && malformed("exposure", "-"));
