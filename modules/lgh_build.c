@@ -374,8 +374,8 @@ static uint32_t log2_floor(uint32_t x)
 static void follow_settings(lgh_build *b, const render_settings *s, uint32_t key)
 {
     b->slots = s->vpls;
-    // In a room the lights' surfaces fill several times cells^2 vertices, so sqrt(N) / 4 cells would do; halls, lines and
-    // spot-lit patches stay below N / 2 on finer grids. A grid too fine for any of them only costs its masks.
+    // In a room the lights' surfaces fill several times cells^2 vertices, so sqrt(N) / 4 cells would do; halls, lines
+    // and spot-lit patches stay below N / 2 on finer grids. A grid too fine for any of them only costs its masks.
     b->exponent = min_u32(log2_floor(s->vpls) / 2 + 2, LGH_EXPONENTS - 1);
     if (s->levels > 0)
         b->exponent = min_u32(max_u32(s->levels - 1, 1), LGH_EXPONENTS - 1);
@@ -400,7 +400,8 @@ static void lgh_build_setup(renderer *r, void *state)
     }
     follow_settings(b, s, s->seed * 0x9e3779b9u + r->frame);
     const bool ordered = s->s1 == LGH_S1_ORDERED && s->build != LGH_BUILD_SCATTER;
-    const bool sorted = ordered || s->end_point == END_POINT_VPL;
+    const bool sorted = ordered || s->end_point == END_POINT_VPL ||
+                        (s->start_level == 0 && s->lighting == LIGHTING_GATHER); // which looks VPLs up by cell
     declare_bounds(r, b);
     declare_sort(r, b, sorted);
     declare_levels(r, b);

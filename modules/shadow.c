@@ -70,9 +70,10 @@ static void shadow_setup(renderer *r, void *state)
     if (!renderer_has_shadows(r))
         return;
     const render_settings *s = &r->settings;
-    const uint32_t variant =
-        (s->reservoirs == RESERVOIRS_EXACT ? EXACT : 0) | (s->sampling == SAMPLING_UNIFORM ? UNIFORM : 0) |
-        (s->end_point == END_POINT_JITTER ? JITTER : 0) | (s->end_point == END_POINT_VPL ? VPL : 0);
+    const uint32_t variant = (s->lighting == LIGHTING_VOLUMES && s->reservoirs == RESERVOIRS_EXACT ? EXACT : 0) |
+                             (s->sampling == SAMPLING_UNIFORM ? UNIFORM : 0) |
+                             (s->end_point == END_POINT_JITTER ? JITTER : 0) |
+                             (s->end_point == END_POINT_VPL ? VPL : 0);
     const shadow_pass pass = {
         .pipeline = pipeline_of(r, state, variant),
         .width = s->width,

@@ -41,6 +41,7 @@ TEST(defaults_are_the_documented_ones)
     CHECK(settings.shadow_samples == 1 && settings.interleave == 1 && settings.emission == EMISSION_AB);
     CHECK(settings.end_point == END_POINT_VPL && settings.build == LGH_BUILD_RESTRICT &&
           settings.s1 == LGH_S1_ORDERED);
+    CHECK(settings.lighting == LIGHTING_GATHER);
     CHECK(settings.reservoirs == RESERVOIRS_EXACT && settings.sampling == SAMPLING_IMPORTANCE);
     CHECK(settings.start_level == 1 && !settings.sample_s1 && settings.filter && settings.taa);
     CHECK_NEAR(settings.singularity, 0.01, 1e-9);
