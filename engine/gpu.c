@@ -311,6 +311,21 @@ static bool has_ray_pipelines(const device_features *supported, const gpu_desc *
     return supported->ray_pipeline.rayTracingPipeline && !desc->without_ray_pipelines;
 }
 
+// Of what compute shaders do together with the other invocations of their subgroup.
+static bool device_has_subgroups(VkPhysicalDevice device)
+{
+    VkPhysicalDeviceVulkan11Properties subgroups = {.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_1_PROPERTIES};
+    VkPhysicalDeviceProperties2 properties = {
+        .sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_PROPERTIES_2,
+        .pNext = &subgroups,
+    };
+    vkGetPhysicalDeviceProperties2(device, &properties);
+    const VkSubgroupFeatureFlags needed =
+        VK_SUBGROUP_FEATURE_ARITHMETIC_BIT | VK_SUBGROUP_FEATURE_BALLOT_BIT | VK_SUBGROUP_FEATURE_SHUFFLE_BIT;
+    return subgroups.subgroupSupportedStages & VK_SHADER_STAGE_COMPUTE_BIT &&
+           (subgroups.subgroupSupportedOperations & needed) == needed;
+}
+
 // Lists what the renderer needs and the device has not; NULL when it has everything.
 static const char *device_missing(VkPhysicalDevice device, const gpu_desc *desc, arena *arena)
 {
@@ -339,6 +354,8 @@ static const char *device_missing(VkPhysicalDevice device, const gpu_desc *desc,
     if (properties.limits.maxPerStageDescriptorSampledImages < GPU_SCENE_TEXTURES_MAX + GPU_BINDINGS_MAX ||
         properties.limits.maxPerStageDescriptorSamplers < GPU_SCENE_TEXTURES_MAX + GPU_BINDINGS_MAX)
         missing = list_append(arena, missing, arena_printf(arena, "%d sampled textures", GPU_SCENE_TEXTURES_MAX));
+    if (!device_has_subgroups(device))
+        missing = list_append(arena, missing, "subgroup arithmetic, ballot and shuffle in compute shaders");
     uint32_t timestamp_bits;
     if (device_queue_family(device, &timestamp_bits) == UINT32_MAX)
         missing = list_append(arena, missing, "a queue for graphics and compute with timestamps");

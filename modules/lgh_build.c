@@ -70,6 +70,7 @@ typedef struct lgh_signature {
     uint32_t build, s1;
     uint32_t demo; // the emission model `demo` weighs all lights alike
     uint32_t key; // of the random numbers; not the frame's, as still VPLs must have still samples
+    uint32_t sorted; // VPLs, into cells
     uint32_t samples; // they are made
     float alpha;
 } lgh_signature;
@@ -86,7 +87,6 @@ typedef struct lgh_build {
     uint32_t frame;
     bool history; // grid and levels of last frame may be kept
     bool changed; // incremental
-    bool sorted; // into cells
 } lgh_build;
 
 typedef struct lgh_step { // user of the passes that build one level
@@ -161,9 +161,9 @@ static void execute_bounds(const frame_graph_context *context, void *user)
 // Keys of S1's cells, sorted.
 static void sort_list(const frame_graph_context *context, const lgh_build *b, lgh_pipeline keys, uint32_t stage)
 {
-    const uint32_t push[] = {b->now.slots, UINT32_MAX, b->sorted};
+    const uint32_t push[] = {b->now.slots, UINT32_MAX, b->now.sorted};
     by_state(context, b, keys, push, sizeof push, STATE_DISPATCH(stretches[stage]));
-    for (uint32_t follow = LGH_SORT_PASSES; b->sorted && follow-- > 0;) {
+    for (uint32_t follow = LGH_SORT_PASSES; b->now.sorted && follow-- > 0;) {
         const uint32_t scan[] = {0, follow};
         const size_t blocks = STATE_DISPATCH(sort) + follow * sizeof(lgh_dispatch);
         by_state(context, b, SORT_COUNT, &follow, 4, blocks);
@@ -199,7 +199,7 @@ static void count_levels(const frame_graph_context *context, const lgh_build *b,
         uint32_t stage, partial_count, exponent, levels, capacity, interleave, sorted;
         float alpha;
     } levels = {stage,           stretches_of(b),   b->now.exponent, b->now.levels,
-                b->now.capacity, b->now.interleave, b->sorted,       b->now.alpha};
+                b->now.capacity, b->now.interleave, b->now.sorted,       b->now.alpha};
     by_state(context, b, CLEAR, &words, 4, STATE_DISPATCH(words[stage]));
     if (stage == 1) {
         const uint32_t keys[] = {b->now.slots, b->now.exponent, 0};
@@ -404,7 +404,7 @@ static void declare_bounds(renderer *r, lgh_build *b)
 
 static void declare_sort(renderer *r, lgh_build *b)
 {
-    frame_graph_pass *p = add_pass(r, b->sorted ? "lgh_build/sort" : "lgh_build/keys", execute_sort, b);
+    frame_graph_pass *p = add_pass(r, b->now.sorted ? "lgh_build/sort" : "lgh_build/keys", execute_sort, b);
     frame_graph_read(p, "vpls", ACCESS_STORAGE_READ);
     read(b, p, LGH_PARTIALS);
     write(r, b, p, LGH_SLOT_CELLS);
@@ -618,7 +618,7 @@ static void declare_all(renderer *r, lgh_build *b)
     declare_levels(r, b, "lgh_build/levels", execute_levels, false);
     declare_levels(r, b, "lgh_build/choose", execute_choose, true);
     declare_compact(r, b);
-    if (b->sorted)
+    if (b->now.sorted)
         declare_cells(r, b);
     if (b->changed)
         declare_move(r, b);
@@ -647,6 +647,8 @@ static uint32_t exponent_of(const render_settings *s)
 static lgh_signature signature_of(const renderer *r)
 {
     const render_settings *s = &r->settings;
+    const uint32_t s1 = s->build == LGH_BUILD_SCATTER ? LGH_S1_ATOMIC : s->s1;
+    const bool by_cell = s->end_point == END_POINT_VPL || (s->start_level == 0 && s->lighting == LIGHTING_GATHER);
     return (lgh_signature){
         .slots = s->vpls,
         .exponent = exponent_of(s),
@@ -655,9 +657,10 @@ static lgh_signature signature_of(const renderer *r)
         .capacity = lgh_capacity(s),
         .interleave = s->interleave,
         .build = s->build,
-        .s1 = s->build == LGH_BUILD_SCATTER ? LGH_S1_ATOMIC : s->s1,
+        .s1 = s1,
         .demo = s->emission == EMISSION_DEMO,
         .key = s->seed * 0x9e3779b9u,
+        .sorted = s1 == LGH_S1_ORDERED || by_cell, // some look VPLs up by their cell
         .samples = s->end_point == END_POINT_VPL && renderer_has_shadows(r),
         .alpha = s->alpha,
     };
@@ -692,8 +695,8 @@ static void sizes_fill(lgh_build *b)
         [LGH_LIGHTS] = sizeof(grid_light) * lights,
         [LGH_PARTIALS] = sizeof(lgh_partial) * stretches_of(b),
         [LGH_TABLE] = 4 * (digits > runs ? digits : runs),
-        [LGH_KEYS_SWAP] = b->sorted ? 4 * slots : none,
-        [LGH_ORDER_SWAP] = b->sorted ? 4 * slots : none,
+        [LGH_KEYS_SWAP] = b->now.sorted ? 4 * slots : none,
+        [LGH_ORDER_SWAP] = b->now.sorted ? 4 * slots : none,
         [LGH_NEW_KEYS] = 4 * slots,
         [LGH_NEW_ORDER] = 4 * slots,
         [LGH_CHANGED] = none,
@@ -710,7 +713,6 @@ static vpl_change frame_begin(renderer *r, lgh_build *b, vpl_change change)
 {
     b->frame = r->frame;
     b->now = signature_of(r);
-    b->sorted = b->now.s1 == LGH_S1_ORDERED || r->settings.end_point == END_POINT_VPL;
     b->changed = false;
     b->buffers.hold = r->settings.incremental;
     sizes_fill(b);

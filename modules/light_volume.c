@@ -196,7 +196,7 @@ static void declare_volumes(renderer *r, light_volume *state, volume_draw draw, 
 
 static void light_volume_setup(renderer *r, void *state)
 {
-    if (!renderer_has_indirect(r))
+    if (!renderer_has_indirect(r) || r->settings.lighting != LIGHTING_VOLUMES)
         return;
     declare_clear(r);
     if (r->settings.interleave > 1)

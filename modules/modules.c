@@ -12,7 +12,8 @@ bool modules_init(renderer *r)
         lgh_build_init, // the lighting grid hierarchy over the VPLs
         gbuffer_init, // what each pixel sees
         direct_light_init, // punctual lights and emissive triangles
-        light_volume_init, // unshadowed indirect light from the hierarchy, and the shadow samples
+        light_gather_init, // unshadowed indirect light from the hierarchy, and the shadow samples
+        light_volume_init, // the same by rasterising, as the paper does
         shadow_init, // shadows of the samples
         interleave_init, // gathers interleaved tiles
         svgf_init, // filters the shadowed and unshadowed estimates alike

@@ -12,6 +12,7 @@ bool vpl_trace_init(renderer *r);
 bool lgh_build_init(renderer *r);
 bool gbuffer_init(renderer *r);
 bool direct_light_init(renderer *r);
+bool light_gather_init(renderer *r);
 bool light_volume_init(renderer *r);
 bool shadow_init(renderer *r);
 bool interleave_init(renderer *r);

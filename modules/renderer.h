@@ -26,9 +26,12 @@
 //   direct             RGBA32F       light of the punctual lights that are shadowed one by one   direct_light
 //   direct_u, direct_s RGBA32F       unshadowed and shadowed estimate of sampled direct light, where there is any
 //   direct_analytic    RGBA32F       its unshadowed light without noise, where that is known
-//   indirect           RGBA32F       unshadowed; a: sum of the weights f; tiled when interleaved         light_volume
+//   indirect           RGBA32F       unshadowed; a: sum of the weights f; tiled when interleaved
+//                                    (by light_gather or light_volume, like the next two)
 //   lights_per_pixel   R32F          lights with a non-zero blending function; tiled like `indirect`
-//   reservoirs         buffer        shadow samples
+//   reservoirs         buffer        shadow samples a pixel: uint[k + 1], a sum's bits and k lights; light_volume's
+//                                    exact ones: uint64_t[k], key and light
+//   gather_*                         light lists: see shaders/light_gather.glsl.h                light_gather
 //   indirect_gathered  RGBA32F       `indirect` over the tiles; only when interleaved                    interleave
 //   shadow_u, shadow_s RGBA32F       unshadowed and shadowed estimate of indirect light          shadow
 //   filter_geometry    RGBA32F       shading normal and view depth, 0 where nothing is; for filters  svgf
@@ -71,6 +74,7 @@ typedef struct renderer {
     render_settings settings; // may be changed between frames
     render_camera camera; // may be changed between frames
     bool count_lights; // makes `lights_per_pixel`
+    uint32_t gather_entries; // entries of light_gather's lists at most; 0: 4,194,304
     // Names kept beside "radiance" and "display" for frame_graph_find_*, left for transfer reads; "name|-" may be
     // absent.
     const char *exports[RENDERER_EXPORTS_MAX];

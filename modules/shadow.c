@@ -71,7 +71,7 @@ static void shadow_setup(renderer *r, void *state)
     if (!renderer_has_shadows(r))
         return;
     const render_settings *s = &r->settings;
-    const uint32_t variant = (s->reservoirs == RESERVOIRS_EXACT ? EXACT : 0) |
+    const uint32_t variant = (s->lighting == LIGHTING_VOLUMES && s->reservoirs == RESERVOIRS_EXACT ? EXACT : 0) |
                              (s->sampling == SAMPLING_UNIFORM ? UNIFORM : 0) |
                              (s->end_point == END_POINT_JITTER ? JITTER : 0) |
                              (s->end_point == END_POINT_VPL ? VPL : 0) | (s->blend == BLEND_PAPER ? PAPER_BLEND : 0);

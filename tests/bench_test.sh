@@ -73,7 +73,7 @@ bench tiny.json -o once || fail "exit code $?: $(cat stderr)"
 [ ! -s stderr ] || fail "not quiet: $(cat stderr)"
 [ "$(wc -l <once/results.csv)" = 3 ] || fail "results.csv has not two rows: $(cat once/results.csv)"
 for configuration in alpha=1 alpha=2; do
-  for name in frame_ms frame_ms_p95 picture_ms lights_per_pixel rays_per_pixel grid_lights memory_mb ms:light_volume \
+  for name in frame_ms frame_ms_p95 picture_ms lights_per_pixel rays_per_pixel grid_lights memory_mb ms:light_gather \
     ms_p95:shadow truth.relative_l2 truth.relative_mse truth.energy truth.psnr truth.flip_mean truth.hdr_flip_p99; do
     value=$(column once/results.csv $configuration $name)
     is_number "$value" || fail "$configuration: $name is \"$value\""

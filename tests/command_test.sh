@@ -268,7 +268,7 @@ for key in device scene settings size frames passes ms_p50 ms_p95 steps frame_ms
   lights_per_pixel rays vpl direct shadow rays_per_pixel flux per_level gpu_memory_peak_bytes validation_messages; do
   grep -q "\"$key\":" a.json || fail "the statistics have no \"$key\""
 done
-for module in vpl_trace lgh_build gbuffer light_volume shadow composite tonemap; do
+for module in vpl_trace lgh_build gbuffer light_gather shadow composite tonemap; do
   grep -q "\"name\":	\"$module\"" a.json || fail "the statistics have no pass \"$module\""
 done
 grep -q '"lights_per_pixel":	[1-9]' a.json || fail "no light per pixel: $(grep lights_per_pixel a.json)"

@@ -473,13 +473,26 @@ TEST(interleaving_conserves_energy)
     fixture_destroy(&f);
 }
 
-TEST(exact_reservoirs_pick_light_i_with_probability_f_i)
+// The light that reservoir k of a pixel chose; RESERVOIR_EMPTY: none.
+static const uint32_t RESERVOIR_EMPTY = 0xffffffffu;
+static uint32_t reservoir_light(const uint32_t *reservoirs, uint32_t lighting, size_t pixel, int k, int samples)
+{
+    if (lighting == LIGHTING_GATHER)
+        return reservoirs[pixel * (samples + 1) + 1 + k];
+    return reservoirs[2 * (pixel * samples + k)]; // low word of a 64-bit key
+}
+
+static void check_reservoirs(uint32_t lighting)
 {
     enum { WIDTH = 64, HEIGHT = 36, SAMPLES = 4 };
+    // Gather spreads a pixel's reservoirs apart, so that only those of different pixels are independent: it is tested
+    // by one a pixel, in turn.
+    const int stride = lighting == LIGHTING_GATHER ? SAMPLES : 1;
     render_settings s = small_settings(WIDTH, HEIGHT, 60);
     s.levels = 2;
     s.shadow_samples = SAMPLES;
     s.start_level = 1; // VPLs have names of their own
+    s.lighting = lighting;
     fixture f = fixture_create(SCENES "cornell.glb", NULL, &s);
     selection *pass = renderer_pass_add(f.r, "selection", sizeof *pass, selection_setup, selection_fini);
     pass->pipeline =
@@ -489,7 +502,7 @@ TEST(exact_reservoirs_pick_light_i_with_probability_f_i)
     for (int frame = 0; frame < 8; frame++) {
         CHECK(renderer_frame(f.r));
         float *weights = read_buffer(f.r, "selection_weights");
-        uint64_t *keys = read_buffer(f.r, "reservoirs");
+        uint32_t *reservoirs = read_buffer(f.r, "reservoirs");
         lgh_header *header = read_buffer(f.r, "lgh_header");
         CHECK(header->level_count == 2 && header->light_count <= SELECTION_LIGHTS);
         for (size_t pixel = 0; pixel < WIDTH * HEIGHT; pixel++) {
@@ -498,18 +511,18 @@ TEST(exact_reservoirs_pick_light_i_with_probability_f_i)
                 sum += weights[pixel * SELECTION_LIGHTS + i];
             for (int i = 0; sum > 0 && i < SELECTION_LIGHTS; i++) {
                 const double p = weights[pixel * SELECTION_LIGHTS + i] / sum;
-                expected[i] += SAMPLES * p;
-                variance[i] += SAMPLES * p * (1 - p);
+                expected[i] += SAMPLES / stride * p;
+                variance[i] += SAMPLES / stride * p * (1 - p);
             }
-            for (int k = 0; k < SAMPLES; k++) {
-                const uint64_t key = keys[pixel * SAMPLES + k];
-                CHECK((key == UINT64_MAX) == (sum == 0));
-                if (key != UINT64_MAX)
-                    picked[(uint32_t)key]++;
+            for (int k = (int)pixel % stride; k < SAMPLES; k += stride) {
+                const uint32_t light = reservoir_light(reservoirs, lighting, pixel, k, SAMPLES);
+                CHECK((light == RESERVOIR_EMPTY) == (sum == 0));
+                if (light != RESERVOIR_EMPTY)
+                    picked[light]++;
             }
         }
         free(weights);
-        free(keys);
+        free(reservoirs);
         free(header);
     }
     double chi_squared = 0;
@@ -528,6 +541,141 @@ TEST(exact_reservoirs_pick_light_i_with_probability_f_i)
     CHECK(chi_squared < quantile);
     CHECK(chi_squared > n * 0.3); // suspiciously good is wrong as well
     fixture_destroy(&f);
+}
+
+TEST(exact_reservoirs_pick_light_i_with_probability_f_i)
+{
+    check_reservoirs(LIGHTING_VOLUMES);
+}
+
+TEST(gathered_reservoirs_pick_light_i_with_probability_f_i)
+{
+    check_reservoirs(LIGHTING_GATHER);
+}
+
+// ---- Gather lighting
+
+// The light and the numbers of lights of one frame, in the tiled layout; free() both.
+typedef struct lighting_result {
+    float *light, *count; // RGBA, R
+    size_t texels;
+} lighting_result;
+
+static lighting_result lighting_render(renderer *r, uint32_t lighting)
+{
+    r->settings.lighting = lighting;
+    r->count_lights = true;
+    export_names(r, (const char *const[]){"indirect", "lights_per_pixel"}, 2);
+    CHECK(renderer_frame(r));
+    const gpu_image_desc *info = gpu_image_info(r->gpu, frame_graph_find_image(r->graph, "indirect"));
+    return (lighting_result){read_image(r, "indirect"), read_image(r, "lights_per_pixel"),
+                             (size_t)info->width * info->height};
+}
+
+static void lighting_result_free(lighting_result *result)
+{
+    free(result->light);
+    free(result->count);
+}
+
+static void check_gather_equals_volumes(renderer *r, const char *what)
+{
+    lighting_result gathered = lighting_render(r, LIGHTING_GATHER), drawn = lighting_render(r, LIGHTING_VOLUMES);
+    CHECK(gathered.texels == drawn.texels);
+    double difference = 0, square = 0, lights = 0;
+    size_t miscounted = 0;
+    for (size_t i = 0; i < gathered.texels; i++) {
+        for (int c = 0; c < 3; c++) {
+            const double a = gathered.light[4 * i + c], b = drawn.light[4 * i + c];
+            difference += (a - b) * (a - b);
+            square += b * b;
+        }
+        miscounted += gathered.count[i] != drawn.count[i];
+        lights += gathered.count[i];
+    }
+    printf("  %s: relative L2 %.1e, %.1f lights per pixel, other numbers at %zu of %zu pixels\n", what,
+           sqrt(difference / square), lights / (double)gathered.texels, miscounted, gathered.texels);
+    CHECK(square > 0);
+    CHECK(sqrt(difference / square) < 1e-4);
+    // Where the rounding of a distance decides whether a blending function is zero.
+    CHECK(miscounted <= gathered.texels / 200);
+    lighting_result_free(&gathered);
+    lighting_result_free(&drawn);
+}
+
+TEST(gathering_adds_up_the_lights_of_the_volumes)
+{
+    static const struct {
+        const char *name, *scene, *camera;
+        uint32_t vpls, levels, start_level, interleave;
+        float alpha;
+    } cases[] = {
+        {"atrium", SCENES "atrium.glb", NULL, 30000, 0, 1, 1, 1},
+        {"2x2", SCENES "atrium.glb", NULL, 30000, 0, 1, 2, 1},
+        {"4x4", SCENES "cornell.glb", NULL, 10000, 0, 1, 4, 1},
+        {"pixels outside the lights' box", SCENES "two_rooms.glb", "unlit", 5000, 0, 1, 1, 1},
+        {"alpha 0.4", SCENES "cornell.glb", NULL, 5000, 0, 1, 1, 0.4f},
+        {"alpha 2", SCENES "atrium.glb", NULL, 5000, 0, 1, 1, 2},
+        {"alpha 2.7, 2x2", SCENES "cornell.glb", NULL, 5000, 0, 1, 2, 2.7f},
+        {"alpha 16", SCENES "cornell.glb", NULL, 1000, 0, 1, 1, 16},
+        {"one level", SCENES "cornell.glb", NULL, 1000, 1, 1, 1, 1},
+        {"one level, from the VPLs", SCENES "cornell.glb", NULL, 1000, 1, 0, 1, 1},
+        {"from the VPLs", SCENES "cornell.glb", NULL, 5000, 0, 0, 1, 1},
+        {"from the VPLs, 2x2, alpha 1.5", SCENES "cornell.glb", NULL, 5000, 0, 0, 2, 1.5f},
+        {"ten levels", SCENES "cornell.glb", NULL, 300, LGH_EXPONENTS, 1, 1, 1},
+        {"one VPL", SCENES "cornell.glb", NULL, 1, 0, 1, 1, 1},
+    };
+    for (size_t i = 0; i < countof(cases); i++) {
+        render_settings s = small_settings(101, 57, cases[i].vpls); // of odd sizes tiles are padded
+        s.levels = cases[i].levels;
+        s.start_level = cases[i].start_level;
+        s.interleave = cases[i].interleave;
+        s.alpha = cases[i].alpha;
+        s.only = ONLY_INDIRECT_UNSHADOWED;
+        fixture f = fixture_create(cases[i].scene, cases[i].camera, &s);
+        check_gather_equals_volumes(f.r, cases[i].name);
+        fixture_destroy(&f);
+    }
+}
+
+// Lists that find no room are replaced by all lights of the level: the same light, to the bit, from the same lights.
+TEST(lists_that_do_not_fit_change_nothing)
+{
+    static const char *const names[] = {"indirect", "reservoirs"};
+    for (uint32_t start_level = 0; start_level < 2; start_level++) {
+        render_settings s = small_settings(64, 36, 3000);
+        s.start_level = start_level;
+        s.shadow_samples = 4;
+        s.interleave = 1 + start_level;
+        fixture f = fixture_create(SCENES "cornell.glb", NULL, &s);
+        float *light[2];
+        uint32_t *reservoirs[2];
+        static const uint32_t entries[] = {0, 500}; // 0: enough
+        for (int i = 0; i < 2; i++) {
+            f.r->gather_entries = entries[i];
+            f.r->frame = 0; // the same random numbers
+            export_names(f.r, names, countof(names));
+            CHECK(renderer_frame(f.r));
+            light[i] = read_image(f.r, "indirect");
+            reservoirs[i] = read_buffer(f.r, "reservoirs");
+        }
+        if (start_level == 1) {
+            CHECK(memcmp(light[0], light[1], 64 * 36 * 16) == 0);
+            CHECK(memcmp(reservoirs[0], reservoirs[1], 64 * 36 * 5 * 4) == 0);
+        }
+        double difference = 0, sum = 0;
+        for (size_t k = 0; k < 64 * 36 * 4; k++) {
+            difference += fabs(light[0][k] - light[1][k]);
+            sum += light[0][k];
+        }
+        printf("  start level %u: relative difference %.1e\n", start_level, difference / sum);
+        CHECK(sum > 0 && difference <= 1e-5 * sum); // the VPLs' lists are in another order than the VPLs
+        for (int i = 0; i < 2; i++) {
+            free(light[i]);
+            free(reservoirs[i]);
+        }
+        fixture_destroy(&f);
+    }
 }
 
 static double mean_radiance(const char *camera, uint32_t end)
@@ -578,11 +726,12 @@ static uint64_t radiance_hash(render_settings s)
 
 TEST(two_runs_give_the_same_bytes)
 {
-    for (uint32_t i = 0; i < 3; i++) {
+    for (uint32_t i = 0; i < 6; i++) {
         render_settings s = small_settings(64, 36, 5000);
+        s.lighting = i < 3 ? LIGHTING_GATHER : LIGHTING_VOLUMES;
         s.shadow_samples = 4;
-        s.interleave = 1u << i;
-        s.end_point = i;
+        s.interleave = 1u << i % 3;
+        s.end_point = i % 3;
         CHECK(radiance_hash(s) == radiance_hash(s));
     }
 }
@@ -592,7 +741,8 @@ TEST(every_variant_renders)
     render_settings s = small_settings(48, 27, 2000);
     fixture f = fixture_create(SCENES "cornell.glb", NULL, &s);
     f.r->count_lights = true;
-    for (uint32_t i = 0; i < 64; i++) {
+    for (uint32_t i = 0; i < 128; i++) {
+        f.r->settings.lighting = i & 64 ? LIGHTING_VOLUMES : LIGHTING_GATHER;
         f.r->settings.reservoirs = i & 1 ? RESERVOIRS_UNLOCKED : RESERVOIRS_EXACT;
         f.r->settings.sampling = i & 2 ? SAMPLING_UNIFORM : SAMPLING_IMPORTANCE;
         f.r->settings.start_level = i & 4 ? 0 : 1;
@@ -635,6 +785,9 @@ int main(void)
     RUN(start_level_0_and_a_wide_alpha_give_the_brute_force_sum);
     RUN(interleaving_conserves_energy);
     RUN(exact_reservoirs_pick_light_i_with_probability_f_i);
+    RUN(gathered_reservoirs_pick_light_i_with_probability_f_i);
+    RUN(gathering_adds_up_the_lights_of_the_volumes);
+    RUN(lists_that_do_not_fit_change_nothing);
     RUN(a_thin_wall_keeps_the_light_out);
     RUN(two_runs_give_the_same_bytes);
     RUN(every_variant_renders);
