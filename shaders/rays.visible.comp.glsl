@@ -7,8 +7,8 @@ layout(set = 0, binding = 3, scalar) writeonly buffer visible_block { uint visib
 
 void main()
 {
-    uint i = gl_GlobalInvocationID.x;
-    if (i >= push.count)
+    uint i;
+    if (!ray_of(gl_GlobalInvocationID.x, i))
         return;
     vec4 origin = origins[i];
     if (origin.w > 0.0)

@@ -1,13 +1,26 @@
-// The bindings of the tracing shaders: a batch of rays as in modules/rays.h.
+// The bindings of the tracing shaders: a batch of rays as in modules/rays.h; the answers are bound at 3.
 #ifndef RAYS_TRACE_GLSL_H
 #define RAYS_TRACE_GLSL_H
 
 #define TLAS_BINDING 0
 #include "ray.glsl.h"
 
-layout(local_size_x = 256) in;
+layout(local_size_x = RAYS_GROUP) in;
 layout(set = 0, binding = 1, scalar) readonly buffer origins_block { vec4 origins[]; };
 layout(set = 0, binding = 2, scalar) readonly buffer directions_block { vec4 directions[]; };
+layout(set = 0, binding = 4, scalar) readonly buffer header_block { ray_order_header header; };
+layout(set = 0, binding = 5, scalar) readonly buffer order_block { uint order[]; };
 layout(push_constant, scalar) uniform push_block { uint count; } push;
+
+layout(constant_id = 0) const bool ORDERED = false; // else the order of the batch, and the last two are not read
+
+// The ray that an invocation traces; false: none.
+bool ray_of(uint invocation, out uint ray)
+{
+    if (invocation >= (ORDERED ? header.rays : push.count))
+        return false;
+    ray = ORDERED ? order[invocation] : invocation;
+    return true;
+}
 
 #endif
