@@ -161,6 +161,8 @@ gpu_pipeline gpu_graphics_pipeline_create(gpu *gpu, const gpu_graphics_pipeline_
 
 typedef struct gpu_ray_pipeline_desc { // with its shader binding table: one shader of each kind, no recursion
     const gpu_shader *raygen, *miss, *closest_hit, *any_hit;
+    const uint32_t *constants; // for all stages
+    uint32_t constant_count;
 } gpu_ray_pipeline_desc;
 // Only where gpu_has_ray_pipelines (asserted).
 gpu_pipeline gpu_ray_pipeline_create(gpu *gpu, const gpu_ray_pipeline_desc *desc);

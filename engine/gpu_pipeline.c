@@ -411,10 +411,9 @@ gpu_pipeline gpu_graphics_pipeline_create(gpu *gpu, const gpu_graphics_pipeline_
 enum { RAYGEN, MISS, CLOSEST_HIT, ANY_HIT, RAY_STAGES };
 enum { RAYGEN_GROUP, MISS_GROUP, HIT_GROUP, RAY_GROUPS };
 
-static bool ray_stages_init(gpu *gpu, const gpu_ray_pipeline_desc *desc, VkPipelineShaderStageCreateInfo *stages,
-                            gpu_pipeline_object *made)
+static bool ray_stages_init(gpu *gpu, const gpu_ray_pipeline_desc *desc, const specialization *specialization,
+                            VkPipelineShaderStageCreateInfo *stages, gpu_pipeline_object *made)
 {
-    static const specialization none;
     const struct {
         VkShaderStageFlagBits bit;
         const gpu_shader *shader;
@@ -426,7 +425,7 @@ static bool ray_stages_init(gpu *gpu, const gpu_ray_pipeline_desc *desc, VkPipel
     };
     for (int i = 0; i < RAY_STAGES; i++)
         if (!interface_merge(made, sources[i].shader) ||
-            !stage_init(gpu, &stages[i], sources[i].bit, sources[i].shader, &none))
+            !stage_init(gpu, &stages[i], sources[i].bit, sources[i].shader, specialization))
             return false;
     return true;
 }
@@ -493,8 +492,10 @@ gpu_pipeline gpu_ray_pipeline_create(gpu *gpu, const gpu_ray_pipeline_desc *desc
     assert(gpu->has_ray_pipelines);
     gpu_pipeline_object made = {.bind_point = VK_PIPELINE_BIND_POINT_RAY_TRACING_KHR};
     snprintf(made.name, sizeof made.name, "%s", desc->raygen->name);
+    specialization specialization;
+    specialization_init(&specialization, desc->constants, desc->constant_count);
     VkPipelineShaderStageCreateInfo stages[RAY_STAGES] = {0};
-    const bool done = ray_stages_init(gpu, desc, stages, &made) && layout_create(gpu, &made) &&
+    const bool done = ray_stages_init(gpu, desc, &specialization, stages, &made) && layout_create(gpu, &made) &&
                       ray_pipeline_create(gpu, stages, &made) && ray_table_create(gpu, &made);
     for (size_t i = 0; i < countof(stages); i++)
         vkDestroyShaderModule(gpu->device, stages[i].module, NULL);

@@ -7,13 +7,17 @@
 #include "lanternfield_renderer_shaders.h"
 
 #include <stdio.h>
+#include <string.h>
 
 enum { NAME_SIZE = 64 };
 
 enum { KINDS = RAYS_NEAREST + 1 };
+enum { ORDER_COUNT, ORDER_ROOM, ORDER_PLACE, ORDER_STEPS };
 
 typedef struct rays_state {
-    gpu_pipeline query[KINDS], pipeline[KINDS]; // made when first needed: no device need have both
+    // By whether the rays are ordered; made when first needed: no device need have both.
+    gpu_pipeline query[KINDS][2], pipeline[KINDS][2];
+    gpu_pipeline order[ORDER_STEPS];
     embree_rays *embree; // made when first needed
     bool no_embree; // it could not be made
 } rays_state;
@@ -21,10 +25,20 @@ typedef struct rays_state {
 typedef struct rays_pass { // of a tracing pass
     rays_kind kind;
     uint32_t count;
+    bool ordered;
     gpu_pipeline pipeline; // of a GPU's passes
     embree_rays *embree;
     char origins[NAME_SIZE], directions[NAME_SIZE], answers[NAME_SIZE];
+    char order_header[NAME_SIZE], order[NAME_SIZE];
 } rays_pass;
+
+typedef struct order_pass {
+    gpu_pipeline steps[ORDER_STEPS];
+    char header[NAME_SIZE];
+    struct {
+        uint32_t count, all;
+    } push;
+} order_pass;
 
 // Host passes that trace read it: they come after the pass that lets Embree follow the instances.
 static const char scene_token[] = "rays_scene";
@@ -94,6 +108,70 @@ void rays_modify(renderer *r, frame_graph_pass *pass, const char *from, const ch
     }
 }
 
+// ---- Order
+
+static uint32_t ray_groups(uint32_t count)
+{
+    return div_up_u32(count, RAYS_GROUP);
+}
+
+static void order_execute(const frame_graph_context *context, void *user)
+{
+    const order_pass *pass = user;
+    const uint32_t groups[ORDER_STEPS] = {
+        [ORDER_COUNT] = ray_groups(pass->push.count),
+        [ORDER_ROOM] = RAY_ORDER_GROUPS,
+        [ORDER_PLACE] = ray_groups(pass->push.count),
+    };
+    const gpu_buffer header = frame_graph_buffer(context, pass->header);
+    gpu_memory_barrier(context->commands); // the graph lets shaders wait for the memory's last use, not transfers
+    gpu_buffer_fill(context->commands, header, 0, gpu_buffer_size(context->gpu, header), 0);
+    for (int step = 0; step < ORDER_STEPS; step++) {
+        gpu_memory_barrier(context->commands);
+        frame_graph_bind(context, pass->steps[step]);
+        gpu_push(context->commands, &pass->push, sizeof pass->push);
+        gpu_dispatch(context->commands, groups[step], 1, 1);
+    }
+}
+
+static void order_declare(renderer *r, const char *batch, const rays_pass *trace)
+{
+    order_pass args = {.push = {trace->count, trace->kind == RAYS_NEAREST}};
+    memcpy(args.steps, state_of(r)->order, sizeof args.steps);
+    memcpy(args.header, trace->order_header, sizeof args.header);
+    char name[NAME_SIZE];
+    name_print(name, batch, "/order");
+    const frame_graph_pass_desc desc = {
+        .name = name,
+        .kind = FRAME_GRAPH_COMPUTE,
+        .execute = order_execute,
+        .user = &args,
+        .user_size = sizeof args,
+    };
+    frame_graph_pass *pass = frame_graph_pass_add(r->graph, &desc);
+    frame_graph_read(pass, trace->origins, ACCESS_STORAGE_READ);
+    frame_graph_read(pass, trace->directions, ACCESS_STORAGE_READ);
+    const frame_graph_resource_desc header =
+        frame_graph_buffer_of(sizeof(ray_order_header) + RAY_ORDER_BUCKETS * sizeof(uint32_t));
+    const frame_graph_resource_desc order = frame_graph_buffer_of(max_u32(trace->count, 1) * sizeof(uint32_t));
+    frame_graph_create_resource(pass, trace->order_header, &header, ACCESS_STORAGE_READ_WRITE);
+    frame_graph_create_resource(pass, trace->order, &order, ACCESS_STORAGE_WRITE);
+}
+
+// The tracing pass's next two bindings: the order, or buffers that are not read.
+static void order_use(frame_graph_pass *pass, const rays_pass *trace)
+{
+    static const frame_graph_resource_desc unused = {.kind = FRAME_GRAPH_BUFFER, .size = 16};
+    const char *const names[] = {trace->order_header, trace->order};
+    for (size_t i = 0; i < countof(names); i++)
+        if (trace->ordered)
+            frame_graph_read(pass, names[i], ACCESS_STORAGE_READ);
+        else
+            frame_graph_create_resource(pass, names[i], &unused, ACCESS_STORAGE_WRITE);
+    if (trace->ordered)
+        frame_graph_read(pass, trace->order_header, ACCESS_INDIRECT);
+}
+
 // ---- Tracing
 
 static void query_execute(const frame_graph_context *context, void *user)
@@ -101,8 +179,10 @@ static void query_execute(const frame_graph_context *context, void *user)
     const rays_pass *pass = user;
     frame_graph_bind(context, pass->pipeline);
     gpu_push(context->commands, &pass->count, sizeof pass->count);
-    // 128 a group would be one group too many for two rays at each of 2048x2048 pixels.
-    gpu_dispatch(context->commands, div_up_u32(pass->count, 256), 1, 1);
+    if (pass->ordered)
+        gpu_dispatch_indirect(context->commands, frame_graph_buffer(context, pass->order_header), 0);
+    else
+        gpu_dispatch(context->commands, ray_groups(pass->count), 1, 1);
 }
 
 static void pipeline_execute(const frame_graph_context *context, void *user)
@@ -143,11 +223,21 @@ void rays_trace(renderer *r, const char *batch, rays_kind kind, uint32_t count)
     const rays_state *state = state_of(r);
     const ray_method tracer = rays_tracer(r);
     const bool host = tracer == RAYS_EMBREE;
-    rays_pass args = {.kind = kind, .count = count, .embree = state->embree};
-    args.pipeline = tracer == RAYS_PIPELINE ? state->pipeline[kind] : state->query[kind];
+    const bool ordered = !host && r->settings.ray_order;
+    rays_pass args = {
+        .kind = kind,
+        .count = count,
+        .ordered = ordered,
+        .pipeline = tracer == RAYS_PIPELINE ? state->pipeline[kind][ordered] : state->query[kind][ordered],
+        .embree = state->embree,
+    };
     name_print(args.origins, batch, "_origins");
     name_print(args.directions, batch, "_directions");
     name_print(args.answers, batch, kind == RAYS_NEAREST ? "_hits" : "_visible");
+    name_print(args.order_header, batch, "_order_header");
+    name_print(args.order, batch, "_order");
+    if (ordered)
+        order_declare(r, batch, &args);
     char name[NAME_SIZE];
     name_print(name, batch, "/trace");
     const frame_graph_pass_desc desc = {
@@ -164,6 +254,8 @@ void rays_trace(renderer *r, const char *batch, rays_kind kind, uint32_t count)
     const frame_graph_resource_desc answers =
         batch_buffer(r, count, kind == RAYS_NEAREST ? sizeof(ray_hit) : sizeof(uint32_t));
     frame_graph_create_resource(pass, args.answers, &answers, host ? ACCESS_HOST_WRITE : ACCESS_STORAGE_WRITE);
+    if (!host)
+        order_use(pass, &args);
 }
 
 // ---- The scene for Embree
@@ -212,11 +304,13 @@ static bool query_require(renderer *r, rays_state *state)
         log_error("--rays query: %s has no ray query; expected auto or pipeline", gpu_name(r->gpu));
         return false;
     }
-    for (uint32_t kind = 0; kind < KINDS; kind++)
-        if (!state->query[kind].id)
-            state->query[kind] =
-                gpu_compute_pipeline_create(r->gpu, &(gpu_compute_pipeline_desc){.shader = shaders[kind]});
-    return state->query[RAYS_VISIBLE].id && state->query[RAYS_NEAREST].id;
+    const uint32_t ordered = r->settings.ray_order;
+    for (uint32_t kind = 0; kind < KINDS; kind++) {
+        const gpu_compute_pipeline_desc desc = {.shader = shaders[kind], .constants = &ordered, .constant_count = 1};
+        if (!state->query[kind][ordered].id)
+            state->query[kind][ordered] = gpu_compute_pipeline_create(r->gpu, &desc);
+    }
+    return state->query[RAYS_VISIBLE][ordered].id && state->query[RAYS_NEAREST][ordered].id;
 }
 
 static bool pipeline_require(renderer *r, rays_state *state)
@@ -229,17 +323,20 @@ static bool pipeline_require(renderer *r, rays_state *state)
         log_error("--rays pipeline: %s has no ray-tracing pipelines; expected auto or query", gpu_name(r->gpu));
         return false;
     }
+    const uint32_t ordered = r->settings.ray_order;
     for (uint32_t kind = 0; kind < KINDS; kind++) {
         const gpu_ray_pipeline_desc desc = {
             .raygen = shaders[kind],
             .miss = &shader_rays_rmiss,
             .closest_hit = &shader_rays_rchit,
             .any_hit = &shader_rays_rahit,
+            .constants = &ordered,
+            .constant_count = 1,
         };
-        if (!state->pipeline[kind].id)
-            state->pipeline[kind] = gpu_ray_pipeline_create(r->gpu, &desc);
+        if (!state->pipeline[kind][ordered].id)
+            state->pipeline[kind][ordered] = gpu_ray_pipeline_create(r->gpu, &desc);
     }
-    return state->pipeline[RAYS_VISIBLE].id && state->pipeline[RAYS_NEAREST].id;
+    return state->pipeline[RAYS_VISIBLE][ordered].id && state->pipeline[RAYS_NEAREST][ordered].id;
 }
 
 // Has the tracer of this frame ready. False where --rays asks for what cannot be had (logged).
@@ -270,14 +367,27 @@ static void rays_fini(renderer *r, void *user)
 {
     rays_state *state = user;
     embree_rays_destroy(state->embree);
-    for (uint32_t kind = 0; kind < KINDS; kind++) {
-        gpu_pipeline_destroy(r->gpu, state->query[kind]);
-        gpu_pipeline_destroy(r->gpu, state->pipeline[kind]);
+    for (uint32_t i = 0; i < 2 * KINDS; i++) {
+        gpu_pipeline_destroy(r->gpu, state->query[i / 2][i % 2]);
+        gpu_pipeline_destroy(r->gpu, state->pipeline[i / 2][i % 2]);
     }
+    for (uint32_t step = 0; step < ORDER_STEPS; step++)
+        gpu_pipeline_destroy(r->gpu, state->order[step]);
 }
 
 bool rays_init(renderer *r)
 {
-    renderer_pass_add(r, "rays", sizeof(rays_state), rays_setup, rays_fini);
-    return true;
+    rays_state *state = renderer_pass_add(r, "rays", sizeof(rays_state), rays_setup, rays_fini);
+    static const gpu_shader *const steps[ORDER_STEPS] = {
+        [ORDER_COUNT] = &shader_rays_order_count_comp,
+        [ORDER_ROOM] = &shader_rays_order_room_comp,
+        [ORDER_PLACE] = &shader_rays_order_place_comp,
+    };
+    bool made = true;
+    for (uint32_t step = 0; step < ORDER_STEPS; step++) {
+        const gpu_compute_pipeline_desc desc = {.shader = steps[step]};
+        state->order[step] = gpu_compute_pipeline_create(r->gpu, &desc);
+        made &= state->order[step].id != 0;
+    }
+    return made;
 }

@@ -4,7 +4,8 @@
 //
 //     const uint32_t count = r->settings.width * r->settings.height;
 //     rays_create(r, pass, "shadow", count);               // in the pass that makes the rays: the next two bindings
-//     rays_trace(r, "shadow", RAYS_VISIBLE, count);         // adds the pass "shadow/trace", which makes shadow_visible
+//     rays_trace(r, "shadow", RAYS_VISIBLE, count);         // adds "shadow/order" and "shadow/trace", which makes
+//                                                           // shadow_visible
 //     frame_graph_read(next, "shadow_visible", ACCESS_STORAGE_READ);
 //
 // Resources of a batch X, each of `count` items (structs in shaders/shared.h, access from shaders in rays.glsl.h):
@@ -13,7 +14,12 @@
 //   X_visible     uint      RAYS_VISIBLE: 1 where nothing lies on the ray within its reach; undefined without a ray
 //   X_hits        ray_hit   RAYS_NEAREST: instance RAY_MISS where nothing was hit, or there is no ray
 //
-// All tracers respect alpha masks and see both sides of every triangle. They find the same hits but for rounding.
+//   X_order       uint      which rays to trace, those next to each other alike; absent ones are left out (but not of
+//                           RAYS_NEAREST). On a GPU, and not with --no-ray-order
+//   X_order_header          ray_order_header and RAY_ORDER_BUCKETS numbers of the pass "X/order" that makes both
+//
+// Answers lie at the ray's own index and do not depend on the order. All tracers respect alpha masks and see both
+// sides of every triangle. They find the same hits but for rounding.
 #pragma once
 
 #include "renderer.h"

@@ -5,8 +5,8 @@ layout(set = 0, binding = 3, scalar) writeonly buffer hits_block { ray_hit hits[
 
 void main()
 {
-    uint i = INVOCATION;
-    if (i >= push.count)
+    uint i;
+    if (!ray_of(INVOCATION, i))
         return;
     vec4 origin = origins[i];
     surface_hit hit = surface_hit(RAY_MISS, 0u, 0u, vec2(0.0));

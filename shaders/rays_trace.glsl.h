@@ -1,5 +1,6 @@
-// The bindings of the tracing shaders: a batch of rays as in modules/rays.h. Each shader exists twice, as a compute
-// shader with ray queries and as the ray generation shader of a pipeline, which defines RAY_PIPELINE.
+// The bindings of the tracing shaders: a batch of rays as in modules/rays.h; the answers are bound at 3. Each shader
+// exists twice, as a compute shader with ray queries and as the ray generation shader of a pipeline, which defines
+// RAY_PIPELINE.
 #ifndef RAYS_TRACE_GLSL_H
 #define RAYS_TRACE_GLSL_H
 
@@ -9,12 +10,25 @@
 #define INVOCATION gl_LaunchIDEXT.x
 #else
 #include "ray.glsl.h"
-layout(local_size_x = 256) in;
+layout(local_size_x = RAYS_GROUP) in;
 #define INVOCATION gl_GlobalInvocationID.x
 #endif
 
 layout(set = 0, binding = 1, scalar) readonly buffer origins_block { vec4 origins[]; };
 layout(set = 0, binding = 2, scalar) readonly buffer directions_block { vec4 directions[]; };
+layout(set = 0, binding = 4, scalar) readonly buffer header_block { ray_order_header header; };
+layout(set = 0, binding = 5, scalar) readonly buffer order_block { uint order[]; };
 layout(push_constant, scalar) uniform push_block { uint count; } push;
+
+layout(constant_id = 0) const bool ORDERED = false; // else the order of the batch, and the last two are not read
+
+// The ray that an invocation traces; false: none.
+bool ray_of(uint invocation, out uint ray)
+{
+    if (invocation >= (ORDERED ? header.rays : push.count))
+        return false;
+    ray = ORDERED ? order[invocation] : invocation;
+    return true;
+}
 
 #endif

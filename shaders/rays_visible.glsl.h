@@ -5,8 +5,8 @@ layout(set = 0, binding = 3, scalar) writeonly buffer visible_block { uint visib
 
 void main()
 {
-    uint i = INVOCATION;
-    if (i >= push.count)
+    uint i;
+    if (!ray_of(INVOCATION, i))
         return;
     vec4 origin = origins[i];
     if (origin.w > 0.0)

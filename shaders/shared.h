@@ -148,6 +148,14 @@ SHARED_STRUCT(ray_hit) {
     SHARED_VEC2(barycentrics); // weights of its second and third corner
 } SHARED_END(ray_hit, 20)
 
+#define RAYS_GROUP 256 // invocations of a workgroup that traces; 128: too many for two rays at 2048x2048 pixels
+#define RAY_ORDER_BUCKETS (1 << 18)
+#define RAY_ORDER_GROUPS 256 // workgroups that make room for the buckets
+SHARED_STRUCT(ray_order_header) { // VkDispatchIndirectCommand in front
+    uint groups_x, groups_y, groups_z; // workgroups of RAYS_GROUP
+    uint rays; // listed
+} SHARED_END(ray_order_header, 16)
+
 #define DIRECT_SAMPLES_MAX 8 // shadow rays a pixel for each kind of sampled direct light
 
 // ---- Path tracing

@@ -1,7 +1,8 @@
 // Rays in batches: all tracers find what the geometry says, and the same in scenes.
 //
 //     device_rays                      the tests
-//     device_rays bench SCENE [RAYS]   millions of shadow rays per second: by each tracer, and by Embree alone
+//     device_rays bench SCENE [K]      millions of the renderer's shadow rays per second, 640x360 and K a pixel: by
+//                                      query and pipeline as they come and ordered, by Embree, and by Embree alone
 #include "engine/gpu_internal.h"
 #include "engine/parallel.h"
 #include "modules/rays.h"
@@ -124,6 +125,16 @@ static void answers_free(answers *a)
 {
     free(a->hits);
     free(a->visible);
+}
+
+static bool pass_ran(const renderer *r, const char *name)
+{
+    uint32_t count;
+    const frame_graph_timing *timings = frame_graph_timings(r->graph, &count);
+    for (uint32_t i = 0; i < count; i++)
+        if (strcmp(timings[i].name, name) == 0)
+            return true;
+    return false;
 }
 
 static void matrix_at(float matrix[16], float x, float y, float z)
@@ -360,6 +371,34 @@ TEST(all_find_the_same_in_scenes)
     }
 }
 
+TEST(answers_do_not_depend_on_the_order)
+{
+    enum { RAYS = 30000 };
+    scene_data *scene = scene_load(OWN_SCENES "atrium.glb");
+    ray *rays = random_rays(scene, RAYS);
+    for (uint32_t i = 0; i < RAYS; i += 3)
+        rays[i].reach = 0; // no ray
+    renderer *r = renderer_of(scene);
+    CHECK(r->settings.ray_order);
+    answers ordered = trace(r, RAYS_QUERY, rays, RAYS);
+    CHECK(pass_ran(r, "seen/order"));
+    r->settings.ray_order = false;
+    answers plain = trace(r, RAYS_QUERY, rays, RAYS);
+    CHECK(!pass_ran(r, "seen/order"));
+    CHECK(memcmp(ordered.hits, plain.hits, RAYS * sizeof *plain.hits) == 0);
+    uint32_t visible = 0;
+    for (uint32_t i = 0; i < RAYS; i++) {
+        CHECK(rays[i].reach > 0 ? ordered.visible[i] == plain.visible[i] : ordered.hits[i].instance == RAY_MISS);
+        visible += rays[i].reach > 0 && plain.visible[i];
+    }
+    CHECK(visible > RAYS / 20 && visible < RAYS / 2);
+    answers_free(&ordered);
+    answers_free(&plain);
+    free(rays);
+    renderer_destroy(r);
+    scene_destroy(scene);
+}
+
 // ---- Alpha masks
 
 typedef struct mask_case {
@@ -573,16 +612,6 @@ TEST(embree_gives_the_same_bytes_every_time)
     scene_destroy(scene);
 }
 
-static bool pass_ran(const renderer *r, const char *name)
-{
-    uint32_t count;
-    const frame_graph_timing *timings = frame_graph_timings(r->graph, &count);
-    for (uint32_t i = 0; i < count; i++)
-        if (strcmp(timings[i].name, name) == 0)
-            return true;
-    return false;
-}
-
 TEST(only_the_structure_that_is_traced_is_built)
 {
     quad_scene s;
@@ -744,33 +773,35 @@ static double pass_milliseconds(const renderer *r, const char *name)
     return 0;
 }
 
-// From where one random ray ends to where another does, as from a pixel to a VPL; in no order.
-static void shadow_rays(renderer *r, ray *rays, uint32_t count)
+enum { BENCH_WIDTH = 640, BENCH_HEIGHT = 360, BENCH_REPEATS = 5 };
+
+// Those of the scene's first camera; `count` of them, absent ones included.
+static ray *shadow_rays(const scene_data *scene, uint32_t samples, uint32_t *count)
 {
-    ray *searching = random_rays(r->scene, 2 * count);
-    for (uint32_t i = 0; i < 2 * count; i++)
-        searching[i].reach = 1e30f;
-    answers a = trace(r, RAYS_EMBREE, searching, 2 * count);
-    for (uint32_t i = 0; i < count; i++) {
-        float ends[2][3], square = 0;
-        for (uint32_t k = 0; k < 2; k++) {
-            const ray *from = &searching[2 * i + k];
-            const ray_hit *hit = &a.hits[2 * i + k];
-            const double reach = hit->instance == RAY_MISS ? 1 : 0.999 * hit_distance(r, from, hit);
-            for (int axis = 0; axis < 3; axis++)
-                ends[k][axis] = from->origin[axis] + (float)reach * from->direction[axis];
-        }
-        for (int axis = 0; axis < 3; axis++) {
-            rays[i].origin[axis] = ends[0][axis];
-            rays[i].direction[axis] = ends[1][axis] - ends[0][axis];
-            square += rays[i].direction[axis] * rays[i].direction[axis];
-        }
-        rays[i].reach = 0.9999f * sqrtf(square);
-        for (int axis = 0; axis < 3; axis++)
-            rays[i].direction[axis] /= sqrtf(square);
+    render_settings settings = render_settings_default();
+    settings.width = BENCH_WIDTH;
+    settings.height = BENCH_HEIGHT;
+    settings.shadow_samples = samples;
+    renderer *r = renderer_create(device, scene, &settings);
+    r->camera = renderer_camera_of_scene(r, 0);
+    r->exports[r->export_count++] = "shadow_origins";
+    r->exports[r->export_count++] = "shadow_directions";
+    CHECK(renderer_frame(r));
+    *count = samples * BENCH_WIDTH * BENCH_HEIGHT;
+    float(*parts[2])[4];
+    for (int i = 0; i < 2; i++) {
+        parts[i] = memory_alloc(*count * sizeof *parts[i]);
+        export_read(r, r->exports[i], parts[i], *count * sizeof *parts[i]);
     }
-    answers_free(&a);
-    free(searching);
+    ray *rays = memory_alloc(*count * sizeof *rays);
+    for (uint32_t i = 0; i < *count; i++) {
+        memcpy(rays[i].origin, parts[0][i], sizeof *parts[0]);
+        memcpy(rays[i].direction, parts[1][i], sizeof *parts[1]);
+    }
+    free(parts[0]);
+    free(parts[1]);
+    renderer_destroy(r);
+    return rays;
 }
 
 static int compare_doubles(const void *left, const void *right)
@@ -785,39 +816,53 @@ static double median(double *values, size_t count)
     return values[count / 2];
 }
 
-static int print_bench(const char *path, uint32_t count)
+typedef enum contender { QUERY, ORDERED, PIPELINE, PIPELINE_ORDERED, EMBREE, ALONE, CONTENDERS } contender;
+
+static double contender_milliseconds(renderer *r, contender c, const ray *rays, uint32_t count)
 {
-    enum { REPEATS = 9 };
+    static const uint32_t contender_tracers[] = {RAYS_QUERY, RAYS_QUERY, RAYS_PIPELINE, RAYS_PIPELINE, RAYS_EMBREE};
+    r->settings.ray_order = c == ORDERED || c == PIPELINE_ORDERED;
+    answers a = trace(r, contender_tracers[c], rays, count);
+    answers_free(&a);
+    return pass_milliseconds(r, "seen/order") + pass_milliseconds(r, "seen/trace");
+}
+
+static void print_rates(const renderer *r, double milliseconds[CONTENDERS][BENCH_REPEATS], uint32_t present)
+{
+    double rates[CONTENDERS];
+    for (int c = 0; c < CONTENDERS; c++)
+        rates[c] = 1e-3 * present / median(milliseconds[c], BENCH_REPEATS);
+    printf("pipeline %.3f, ordered %.3f, %.2f times\n", rates[PIPELINE], rates[PIPELINE_ORDERED],
+           rates[PIPELINE_ORDERED] / rates[PIPELINE]);
+    printf("query %.3f, ordered (order included) %.3f, %.2f times; embree %.2f, %.1f times query; embree alone, opaque "
+           "%.2f (in the renderer %.2f of it)\n",
+           rates[QUERY], rates[ORDERED], rates[ORDERED] / rates[QUERY], rates[EMBREE], rates[EMBREE] / rates[QUERY],
+           rates[ALONE], rates[EMBREE] / rates[ALONE]);
+    printf("order alone %.2f ms\n", pass_milliseconds(r, "seen/order"));
+}
+
+static int print_bench(const char *path, uint32_t samples)
+{
     scene_data *scene = scene_load(path);
     if (!scene)
         return EXIT_FAILURE;
+    uint32_t count, present = 0;
+    ray *rays = shadow_rays(scene, samples, &count);
+    for (uint32_t i = 0; i < count; i++)
+        present += rays[i].reach > 0;
     renderer *r = renderer_of(scene);
     parallel *pool = parallel_create(0);
     bare b = {.rays = aligned_alloc(16, count * sizeof *b.rays)};
     bare_build(&b, scene);
-    ray *rays = memory_alloc(count * sizeof *rays);
-    shadow_rays(r, rays, count);
-    double times[countof(tracers)][REPEATS], alone[REPEATS], visible = 0;
-    for (int i = 0; i < REPEATS; i++) { // in turns, so that what else runs hits all alike
-        for (size_t t = 0; t < countof(tracers); t++) {
-            answers a = trace(r, tracers[t], rays, count);
-            times[t][i] = pass_milliseconds(r, "seen/trace");
-            visible = 0;
-            for (uint32_t k = 0; k < count; k++)
-                visible += a.visible[k];
-            answers_free(&a);
-        }
-        alone[i] = bare_milliseconds(&b, pool, rays, count);
+    double milliseconds[CONTENDERS][BENCH_REPEATS];
+    for (int i = 0; i < BENCH_REPEATS; i++) { // in turns, so that what else runs hits all alike
+        milliseconds[ALONE][i] = bare_milliseconds(&b, pool, rays, count);
+        for (contender c = EMBREE + 1; c-- > 0;)
+            milliseconds[c][i] = contender_milliseconds(r, c, rays, count);
     }
-    double rates[countof(tracers)];
-    for (size_t t = 0; t < countof(tracers); t++)
-        rates[t] = 1e-3 * count / median(times[t], REPEATS);
-    const double alone_rate = 1e-3 * count / median(alone, REPEATS);
-    printf("%s, %u shadow rays, %.1f %% visible, %u threads; Mray/s, median of %d\n", path, count,
-           100 * visible / count, parallel_threads(pool), REPEATS);
-    printf("query %.2f, pipeline %.2f, embree %.2f (%.1f times query), embree alone, opaque %.2f (in the renderer %.2f "
-           "of it)\n",
-           rates[0], rates[1], rates[2], rates[2] / rates[0], alone_rate, rates[2] / alone_rate);
+    printf("%s, %u shadow rays a pixel, %u in all; %u threads; Mray/s, median of %d\n", path, samples, present,
+           parallel_threads(pool), BENCH_REPEATS);
+    print_rates(r, milliseconds, present);
     free(rays);
     free(b.rays);
     rtcReleaseScene(b.scene);
@@ -847,9 +892,10 @@ int main(int argc, char **argv)
         return 77;
     }
     if (bench)
-        return print_bench(argv[2], argc > 3 ? (uint32_t)strtoul(argv[3], NULL, 10) : 230400);
+        return print_bench(argv[2], argc > 3 ? (uint32_t)strtoul(argv[3], NULL, 10) : 1);
     RUN(rays_find_the_nearest_quad_within_their_reach);
     RUN(all_find_the_same_in_scenes);
+    RUN(answers_do_not_depend_on_the_order);
     RUN(alpha_masks_let_the_same_rays_through);
     RUN(all_find_the_same_instances_wherever_they_move);
     RUN(a_moved_quad_is_hit_where_it_went);
