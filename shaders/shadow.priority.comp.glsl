@@ -22,8 +22,11 @@ layout(set = 0, binding = 9) uniform sampler2D previous_shadowed;
 layout(set = 0, binding = 10) uniform sampler2D previous_moments;
 layout(push_constant, scalar) uniform push_block { uint interleave, history_valid; } push;
 
-const float FRAMES_MIN = 4.0; // of a history; below, its variance means nothing
-const float DEVIATION_MIN = 0.1, DEVIATION_NEW = 0.5;
+// Samples of a history; below, its variance means nothing. With 4, the pixels whose first samples were all occluded by
+// chance stayed black dots: no variance, so no samples, and the filter takes them for certain.
+const float FRAMES_MIN = 8.0;
+const float DEVIATION_NEW = 0.5;
+const float PRIOR = 2.0; // samples that the expectation of DEVIATION_NEW is worth
 
 shared uint counts[2u * PRIORITIES];
 
@@ -32,7 +35,9 @@ float deviation_of(ivec2 tap)
 {
     float u = luminance(texelFetch(previous_unshadowed, tap, 0).rgb);
     float s = luminance(texelFetch(previous_shadowed, tap, 0).rgb);
-    return max(sqrt(svgf_variance(u, s, texelFetch(previous_moments, tap, 0).xyz).x), DEVIATION_MIN);
+    vec4 moments = texelFetch(previous_moments, tap, 0);
+    float variance = mix(svgf_variance(u, s, moments.xyz).x, DEVIATION_NEW * DEVIATION_NEW, PRIOR / (PRIOR + moments.w));
+    return sqrt(variance);
 }
 
 // 0: the pixel has no indirect light.

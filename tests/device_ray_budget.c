@@ -62,7 +62,7 @@ TEST(budget_is_met)
 {
     static const char *const exports[] = {"rays_shadow"};
     static const float budgets[] = {0.05f, 0.1f, 0.3f};
-    enum { SETTLING = 8, FRAMES = 16 }; // at first every pixel is new and has at least one sample
+    enum { SETTLING = 12, FRAMES = 16 }; // at first every pixel is new and has at least one sample
     for (size_t i = 0; i < countof(budgets); i++) {
         fixture f = fixture_create(4, budgets[i], exports, countof(exports));
         uint32_t rays = 0, first = 0;
@@ -86,7 +86,7 @@ TEST(pixels_without_light_have_no_rays)
     for (int budget = 0; budget < 2; budget++) {
         fixture f = fixture_create(1, budget ? 0.1f : 0, exports, countof(exports));
         uint32_t dark = 0, rays = 0, missing = 0;
-        for (int frame = 0; frame < 8; frame++)
+        for (int frame = 0; frame < 12; frame++)
             CHECK(renderer_frame(f.r));
         image_read(f.r, "indirect", indirect);
         image_read(f.r, "shadow_u", unshadowed);
@@ -114,7 +114,7 @@ typedef struct mean {
 // Of `shadow_u` and `shadow_s`.
 static void means_of(uint32_t samples, float budget, mean means[2])
 {
-    enum { FRAMES = 64, SETTLING = 4 };
+    enum { FRAMES = 72, SETTLING = 12 };
     static const char *const exports[] = {"shadow_u", "shadow_s"};
     static texel estimates[2][PIXELS];
     static double sum[2][PIXELS], squares[2][PIXELS], count[PIXELS];
@@ -170,7 +170,7 @@ TEST(two_runs_give_the_same_bytes)
     for (int run = 0; run < 2; run++) {
         fixture f = fixture_create(2, 0.2f, exports, countof(exports));
         f.r->settings.interleave = 2;
-        for (int frame = 0; frame < 6; frame++)
+        for (int frame = 0; frame < 11; frame++)
             CHECK(renderer_frame(f.r));
         image_read(f.r, "radiance", pictures[run]);
         fixture_destroy(&f);
