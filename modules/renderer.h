@@ -34,6 +34,8 @@
 //   gather_*                         light lists: see shaders/light_gather.glsl.h                light_gather
 //   indirect_gathered  RGBA32F       `indirect` over the tiles; only when interleaved                    interleave
 //   shadow_u, shadow_s RGBA32F       unshadowed and shadowed estimate of indirect light          shadow
+//                                    U.a: 1 where the pixel has light but no sample in this frame, else 0
+//   shadow_plan        uint[pixels]  for the ray budget, with shadow_budget: see shadow_budget.glsl.h  shadow
 //   filter_geometry    RGBA32F       shading normal and view depth, 0 where nothing is; for filters  svgf
 //   X_u_filtered, X_s_filtered       for X = shadow, direct                            svgf
 //   X_ratio            RGBA16F       S / U in [0,1], after TAA where it is on          taa

@@ -13,6 +13,7 @@
 #define LGH_BLEND_CONSTANT 3
 #include "lgh_shade.glsl.h"
 #include "reservoir.glsl.h"
+#include "shadow_budget.glsl.h"
 
 layout(local_size_x = 8, local_size_y = 8) in;
 layout(set = 0, binding = 1, scalar) readonly buffer header_block { lgh_header header; };
@@ -24,18 +25,22 @@ layout(set = 0, binding = 6) uniform sampler2D indirect_map;
 layout(set = 0, binding = 7, scalar) readonly buffer keys_block { uint64_t reservoir_keys[]; };
 layout(set = 0, binding = 7, scalar) readonly buffer words_block { uint reservoir_words[]; };
 layout(set = 0, binding = 11, rgba32f) uniform image2D shadow_u;
+layout(set = 0, binding = 12, scalar) readonly buffer budget_block { budget_header budget; };
+layout(set = 0, binding = 13, scalar) readonly buffer plan_block { uint plan[]; };
 #ifdef END_POINT_VPL
-layout(set = 0, binding = 12, scalar) readonly buffer samples_block { uvec4 samples[]; };
+layout(set = 0, binding = 14, scalar) readonly buffer samples_block { uvec4 samples[]; };
 #endif
 layout(push_constant, scalar) uniform push_block {
     uint interleave, emission, start_level, samples;
     uint first, layers; // samples of this batch
     float singularity;  // b, metres
+    float ray_budget;   // rays a pixel
 } push;
 
 layout(constant_id = 0) const bool EXACT = true;
 layout(constant_id = 1) const bool UNIFORM = false;
 layout(constant_id = 2) const bool JITTER = false; // end points of shadow.comp.glsl: jittered, else centres
+layout(constant_id = 4) const bool BUDGET = false; // else all samples, and budget and plan are not read
 
 #include "shadow_end_point.glsl.h"
 
@@ -83,8 +88,22 @@ shadow_sample grid_sample(uint index, gbuffer_point p, uint random)
     return s;
 }
 
-// The part of the pixel's light that a sample stands for; black: it has none.
-vec3 sample_estimate(uint light, float f_sum, gbuffer_point p, uint random, out vec3 end)
+// How many of its samples a pixel with light uses in this frame. The expectation is rounded up or down by a threshold
+// that goes over [0,1) evenly from frame to frame, so that what is spent in vain in one is spent in the next.
+uint samples_used(uint index)
+{
+    if (!BUDGET)
+        return push.samples;
+    uint entry = plan[index];
+    if (entry == 0u)
+        return 0u;
+    float threshold = fract(unit_float(hash(index, frame.seed, 0x2c1b3c6du)) + float(frame.frame & 0xfffu) * 0.61803399);
+    return min(uint(budget_samples(entry, budget.scale, push.ray_budget, float(push.samples)) + threshold),
+               push.samples);
+}
+
+// The part of the pixel's light that one of `used` samples stands for; black: it has none.
+vec3 sample_estimate(uint light, float f_sum, uint used, gbuffer_point p, uint random, out vec3 end)
 {
     end = p.position;
     if (light == RESERVOIR_EMPTY)
@@ -93,16 +112,16 @@ vec3 sample_estimate(uint light, float f_sum, gbuffer_point p, uint random, out 
     shadow_sample chosen = is_vpl ? vpl_sample(light & ~RESERVOIR_VPL, p) : grid_sample(light, p, random);
     end = chosen.end;
     float f = UNIFORM ? 1.0 : luminance(chosen.centre_light);
-    return f > 0.0 ? chosen.end_light * (f_sum / (f * float(push.samples))) : vec3(0.0);
+    return f > 0.0 ? chosen.end_light * (f_sum / (f * float(used))) : vec3(0.0);
 }
 
 // Makes the ray of the batch's sample i where it has light, and adds that to U. Returns the number of rays.
-uint make_ray(uvec2 pixel, uint i, float f_sum, gbuffer_point p, inout vec3 u)
+uint make_ray(uvec2 pixel, uint i, float f_sum, uint used, gbuffer_point p, inout vec3 u)
 {
     uint index = pixel.y * frame.width + pixel.x, s = push.first + i, ray = light_ray_index(pixel, i);
     uint random = hash(hash(index, frame.frame, frame.seed), 0x51ed270bu, s);
     vec3 end;
-    vec3 estimate = sample_estimate(reservoir_light(index, s), f_sum, p, random, end);
+    vec3 estimate = sample_estimate(reservoir_light(index, s), f_sum, used, p, random, end);
     if (luminance(estimate) <= 0.0) {
         light_ray_write_none(ray);
         return 0u;
@@ -122,12 +141,13 @@ void main()
         float f_sum = 0.0;
         if (gbuffer_read(depth_map, normal_map, pixel, point))
             f_sum = texelFetch(indirect_map, ivec2(interleave_texel(pixel, push.interleave, size)), 0).a;
+        uint used = f_sum > 0.0 ? samples_used(pixel.y * frame.width + pixel.x) : 0u;
         for (uint i = 0u; i < push.layers; i++)
-            if (f_sum > 0.0)
-                rays += make_ray(pixel, i, f_sum, point, u);
+            if (push.first + i < used)
+                rays += make_ray(pixel, i, f_sum, used, point, u);
             else
                 light_ray_write_none(light_ray_index(pixel, i));
-        imageStore(shadow_u, ivec2(pixel), vec4(u, 0.0));
+        imageStore(shadow_u, ivec2(pixel), vec4(u, f_sum > 0.0 && used == 0u ? 1.0 : 0.0));
     }
     ray_count(rays);
 }

@@ -1,4 +1,5 @@
 // Temporal accumulation of a pair (U, S) with the same weights for both, and of the second moments of their luminances.
+// U.a: 1 where there is no sample in this frame, and the history stays as it is.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "reproject.glsl.h"
@@ -44,6 +45,8 @@ vec2 pair_now(ivec2 pixel)
     return vec2(luminance(imageLoad(unshadowed_map, pixel).rgb), luminance(imageLoad(shadowed_map, pixel).rgb));
 }
 
+bool is_sampled(ivec2 pixel) { return imageLoad(unshadowed_map, pixel).a == 0.0; }
+
 // `past` is the pixel's place in the last frame.
 surroundings surroundings_of(ivec2 pixel, ivec2 past, gbuffer_point point)
 {
@@ -52,7 +55,7 @@ surroundings surroundings_of(ivec2 pixel, ivec2 past, gbuffer_point point)
     for (int y = -1; y <= 1; y++)
         for (int x = -1; x <= 1; x++) {
             ivec2 tap = pixel + ivec2(x, y), past_tap = past + ivec2(x, y);
-            if (!inside(tap))
+            if (!inside(tap) || !is_sampled(tap))
                 continue;
             vec2 now = pair_now(tap);
             if (x != 0 || y != 0)
@@ -125,9 +128,12 @@ accumulated accumulate(ivec2 pixel, gbuffer_point point)
     accumulated now = current(pixel, around.brightest_neighbour);
     reprojection r;
     if (push.history_valid == 0u || !reproject(uvec2(pixel), point, motion, previous_depth, previous_normals, r))
-        return now;
+        return is_sampled(pixel) ? now : accumulated(vec4(0.0), vec4(0.0), vec4(0.0));
     accumulated before = history(r);
-    float frames = min(before.moments.w * agreement(around, before) + 1.0, 2.0 / SVGF_SHARE);
+    float kept = around.count > 0.0 ? before.moments.w * agreement(around, before) : before.moments.w;
+    if (!is_sampled(pixel))
+        return accumulated(before.unshadowed, before.shadowed, vec4(before.moments.xyz, kept));
+    float frames = min(kept + 1.0, 2.0 / SVGF_SHARE);
     float share = max(1.0 / frames, SVGF_SHARE);
     return accumulated(mix(before.unshadowed, now.unshadowed, share), mix(before.shadowed, now.shadowed, share),
                        vec4(mix(before.moments.xyz, now.moments.xyz, share), frames));

@@ -544,6 +544,28 @@ static void edge_check(stage *s)
     stage_destroy(s);
 }
 
+// U.a = 1: no sample. The history stays, to the bit, and what is sampled again counts as before.
+TEST(pixels_without_a_sample_keep_their_history)
+{
+    static texel before_u[TEXELS_MAX], before_s[TEXELS_MAX];
+    stage *s = stage_create(67, 45);
+    uint32_t random = 23;
+    for (int frame = 0; frame < 8; frame++) {
+        pair_of_samples(s, 0.6f, &random);
+        filter_frame(s, in_u, in_s, before_u, before_s);
+    }
+    for (uint32_t i = 0; i < s->width * s->height; i++) {
+        texel_set(in_u[i], 0, 0, 0);
+        texel_set(in_s[i], 0, 0, 0);
+        in_u[i][3] = 1;
+    }
+    for (int frame = 0; frame < 3; frame++)
+        filter_frame(s, in_u, in_s, out_u, out_s);
+    for (uint32_t i = 0; i < s->width * s->height; i++)
+        CHECK(memcmp(before_u[i], out_u[i], sizeof(texel)) == 0 && memcmp(before_s[i], out_s[i], sizeof(texel)) == 0);
+    stage_destroy(s);
+}
+
 TEST(filter_stops_at_a_step_in_depth)
 {
     stage *s = stage_create(64, 64);
@@ -674,6 +696,7 @@ int main(void)
     RUN(history_follows_the_camera);
     RUN(history_ends_where_another_surface_appears);
     RUN(change_of_light_leaves_no_lag);
+    RUN(pixels_without_a_sample_keep_their_history);
     RUN(filter_stops_at_a_step_in_depth);
     RUN(filter_stops_at_an_edge_between_walls);
     RUN(filter_keeps_a_sharp_shadow_once_it_is_sure);
