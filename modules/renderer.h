@@ -43,6 +43,7 @@
 //   rays_vpl, rays_direct, rays_shadow, rays_path  uint   of this frame, counted by the pass that makes them
 //   X_origins, X_directions, X_visible, X_hits     buffers  batches of rays and their answers; see rays.h
 //   X_estimates        vec3[rays]    the light that each ray of a batch brings, if nothing is in its way  light_rays
+//   probes             probe[]       see modules/probe.h                               probe
 //   vpl_flux           vec3[paths]   of the light paths at their last hit                             vpl_trace
 #pragma once
 
@@ -68,6 +69,7 @@ typedef struct renderer {
     render_settings settings; // may be changed between frames
     render_camera camera; // may be changed between frames
     bool count_lights; // makes `lights_per_pixel`
+    bool probes; // makes `probes`, also without automatic settings
     // Names kept beside "radiance" and "display" for frame_graph_find_*, left for transfer reads; "name|-" may be
     // absent.
     const char *exports[RENDERER_EXPORTS_MAX];
@@ -77,6 +79,7 @@ typedef struct renderer {
     component_type pass_state; // what renderer_pass_add keeps of a pass, switched on or off
     struct world_gpu *gpu_world; // modules/world.c
     uint32_t frame; // number of frames rendered so far
+    double milliseconds; // that the last frame took, by the clock
     bool failed; // in the current frame; systems set it after logging why
 } renderer;
 
