@@ -304,7 +304,16 @@ grep -q "interrupted after" "$work/stderr" || fail "interrupted, and does not sa
 { [ -s a.png ] && [ ! -e b.exr ]; } || fail "interrupted: a.png is missing or b.exr is there"
 rm -f ./*
 
-# ---- Automatic settings.
+# ---- References: progressive methods, their state files, instant radiosity.
+
+tiny=(--size 64x36)
+path=("${tiny[@]}" --method path)
+two_rooms=$scenes/two_rooms.glb
+
+# number KEY FILE: a number of the statistics, the last of that name
+number() { sed -n "s/^\t*\"$1\":\t\([0-9.e+-]*\),\{0,1\}$/\1/p" "$2" | tail -n 1; }
+
+echo "automatic settings: refused, chosen, said and written down"
 refuses 1 "--target-ms and --target-error" render no-such.glb --target-ms 100 --target-error 0.1
 refuses 1 "--target-ms: only --method lgh" render no-such.glb --method path --target-ms 100
 refuses 1 "--target-error: only --method lgh" render no-such.glb --method vpl --target-error 0.1
@@ -317,15 +326,6 @@ grep -q "automatic: frame [0-9]*: [0-9]* VPLs, alpha .* are less than 2000" "$wo
 [ "$(number vpls auto.json)" -gt 500 ] || fail "--target-ms 2000 chose no more than 500 VPLs"
 grep -q '"frame_ms":' auto.json || fail "--target-ms: no times of the frames in --stats"
 rm -f auto.*
-
-# ---- References: progressive methods, their state files, instant radiosity.
-
-tiny=(--size 64x36)
-path=("${tiny[@]}" --method path)
-two_rooms=$scenes/two_rooms.glb
-
-# number KEY FILE: a number of the statistics, the last of that name
-number() { sed -n "s/^\t*\"$1\":\t\([0-9.e+-]*\),\{0,1\}$/\1/p" "$2" | tail -n 1; }
 
 echo "options that do not fit the method are refused before any work"
 refuses 1 "--state: --method lgh" render no-such.glb --state a.state
