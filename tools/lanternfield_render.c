@@ -291,7 +291,9 @@ static void automatic_tell(const renderer *r)
     }
     const double ms = automatic_milliseconds(a), error = automatic_error(a, NULL);
     const char *const state = a->settled ? "" : ", not settled yet";
-    if (a->target_ms > 0) {
+    if (a->age < AUTOMATIC_WINDOW) {
+        log_info("automatic: only %u frames since the last change; more --frames would tell what it brings", a->age);
+    } else if (a->target_ms > 0) {
         log_info("automatic: %.0f ms a frame for --target-ms %g, estimated error %.3f%s", ms, a->target_ms, error,
                  state);
     } else {
