@@ -476,6 +476,10 @@ bool automatic_step(automatic *a, const automatic_frame *frame, render_settings 
     a->age++;
     times_add(a, frame);
     errors_add(a, &frame->probes);
+    if (frame->probes.light == 0 && a->probes.light == 0) { // no indirect light: there is nothing to choose
+        a->settled = a->age >= SETTLED_AGE;
+        return false;
+    }
     if (!(a->target_ms > 0 ? step_for_time(a) : step_for_error(a)))
         return false;
     *settings = a->current;

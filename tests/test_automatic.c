@@ -254,6 +254,17 @@ TEST(simple_scene_gets_few_vpls)
     CHECK(true_error(&sim, &r.settings) < 0.03);
 }
 
+TEST(nothing_is_chosen_without_indirect_light)
+{
+    for (int i = 0; i < 2; i++) {
+        run r = run_start(64, 36, i ? 1000 : 0, i ? 0 : 0.1f);
+        const automatic_frame dark = {.milliseconds = {1, 1, 1, 1, 1}};
+        for (uint32_t frame = 0; frame < 30; frame++)
+            CHECK(!automatic_step(&r.controller, &dark, &r.settings));
+        CHECK(r.controller.settled);
+    }
+}
+
 // ---- Parts
 
 TEST(passes_are_grouped_by_their_module)
@@ -315,6 +326,7 @@ int main(void)
     RUN(error_does_not_depend_on_time);
     RUN(error_out_of_reach_ends_with_the_best_there_is);
     RUN(simple_scene_gets_few_vpls);
+    RUN(nothing_is_chosen_without_indirect_light);
     RUN(passes_are_grouped_by_their_module);
     RUN(error_is_the_ratio_of_the_sums_with_its_standard_error);
     RUN(targets_are_refused_where_there_is_nothing_to_choose);
