@@ -5,6 +5,7 @@
 bool modules_init(renderer *r)
 {
     static bool (*const inits[])(renderer *) = {
+        automatic_init, // between frames: chooses settings for a time or an error
         rays_init, // traces the batches of rays that the other passes make
         light_rays_init, // sums up the light of the shadow rays that nothing is in the way of
         acceleration_init, // top-level acceleration structure over the instances
@@ -22,6 +23,7 @@ bool modules_init(renderer *r)
         vpl_reference_init, // reference: every VPL at every pixel, and instant radiosity
         path_trace_init, // reference: path tracing
         composite_init, // emission + albedo * (direct + indirect * ratio)
+        probe_init, // how far from all VPLs the picture is, at a few pixels
         tonemap_init, // exposure and tone curve
     };
     for (size_t i = 0; i < countof(inits); i++)

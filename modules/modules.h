@@ -5,6 +5,7 @@
 
 bool modules_init(renderer *r); // false on failure (logged)
 
+bool automatic_init(renderer *r);
 bool rays_init(renderer *r);
 bool light_rays_init(renderer *r);
 bool acceleration_init(renderer *r);
@@ -22,4 +23,5 @@ bool progressive_init(renderer *r);
 bool vpl_reference_init(renderer *r);
 bool path_trace_init(renderer *r);
 bool composite_init(renderer *r);
+bool probe_init(renderer *r);
 bool tonemap_init(renderer *r);

@@ -241,9 +241,11 @@ void renderer_destroy(renderer *r)
 
 bool renderer_frame(renderer *r)
 {
+    const double start = time_now();
     r->failed = false;
     ecs_run(r->world);
     r->frame++;
+    r->milliseconds = 1000 * (time_now() - start);
     return !r->failed;
 }
 

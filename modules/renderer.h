@@ -49,6 +49,7 @@
 //   rays_vpl, rays_direct, rays_shadow, rays_path  uint   of this frame, counted by the pass that makes them
 //   X_origins, X_directions, X_visible, X_hits     buffers  batches of rays and their answers; see rays.h
 //   X_estimates        vec3[rays]    the light that each ray of a batch brings, if nothing is in its way  light_rays
+//   probes             probe[]       see modules/probe.h                               probe
 //   vpl_flux           vec3[paths]   of the traced light paths at their last hit                      vpl_trace
 //   vpl_changed        uint[]        a bit a slot, where not all VPLs are traced anew; see vpl_trace.h  vpl_trace
 //   vpl_mask, vpl_list bits and numbers of the paths that are; vpl_shares, vpl_sources, vpl_elements: see shaders/shared.h
@@ -77,6 +78,7 @@ typedef struct renderer {
     render_camera camera; // may be changed between frames
     bool count_lights; // makes `lights_per_pixel`
     uint32_t gather_entries; // entries of light_gather's lists at most; 0: 4,194,304
+    bool probes; // makes `probes`, also without automatic settings
     // Names kept beside "radiance" and "display" for frame_graph_find_*, left for transfer reads; "name|-" may be
     // absent.
     const char *exports[RENDERER_EXPORTS_MAX];
@@ -86,6 +88,7 @@ typedef struct renderer {
     component_type pass_state; // what renderer_pass_add keeps of a pass, switched on or off
     struct world_gpu *gpu_world; // modules/world.c
     uint32_t frame; // number of frames rendered so far
+    double milliseconds; // that the last frame took, by the clock
     bool failed; // in the current frame; systems set it after logging why
 } renderer;
 

@@ -210,6 +210,19 @@ SHARED_STRUCT(vpl) {
     uint bounce;           // 0 is the first hit
 } SHARED_END(vpl, 48)
 
+// ---- Probes: pixels at which every VPL is summed (modules/probe.h). All light is radiance, nits.
+
+#define PROBE_RAYS 128u // of a probe: a quarter for each of two estimates of each half of the VPLs
+
+SHARED_STRUCT(probe) {
+    uint x, y;  // pixel
+    uint drawn; // 0: nothing is there, and all light is zero
+    SHARED_VEC3(shown);              // indirect light of the picture
+    SHARED_VEC3(shown_unshadowed);   // the hierarchy's, before shadows
+    SHARED_VEC3(unshadowed);         // sum over all VPLs
+    SHARED_VEC3(shadowed[2][2]);     // [estimate][half]: of the sum over the VPLs of a half that are visible
+} SHARED_END(probe, 12 + 36 + 48)
+
 // ---- The lighting grid hierarchy. Resolution exponent c: cells of 1 / 2^c of the top level's; level l of L has c = L - l.
 
 #define LGH_EXPONENTS 9       // candidate exponents 0..8, so at most 9 levels and 512 cells along an axis of the grid

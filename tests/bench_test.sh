@@ -209,6 +209,7 @@ broken() { # broken PLACE CONFIGURATIONS [MORE]
   suite broken.json "$2" "${3:-}"
   refuses "broken.json: $1" 1 broken.json -o none
 }
+broken 'configurations[1].settings.target-ms: a row of a suite' "$sweep, {\"name\": \"a\", \"settings\": {\"target-ms\": 100}}"
 broken 'configurations[1].settings.alhpa: unknown option' "$sweep, {\"name\": \"a\", \"settings\": {\"alhpa\": 1}}"
 broken 'configurations[0].settings.alpha: expected a number greater than 0' '{"name": "a", "settings": {"alpha": 0}}'
 broken 'configurations[0].sweep.emission[1]: expected one of demo' '{"sweep": {"emission": ["AB", "C"]}}'

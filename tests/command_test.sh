@@ -313,6 +313,20 @@ two_rooms=$scenes/two_rooms.glb
 # number KEY FILE: a number of the statistics, the last of that name
 number() { sed -n "s/^\t*\"$1\":\t\([0-9.e+-]*\),\{0,1\}$/\1/p" "$2" | tail -n 1; }
 
+echo "automatic settings: refused, chosen, said and written down"
+refuses 1 "--target-ms and --target-error" render no-such.glb --target-ms 100 --target-error 0.1
+refuses 1 "--target-ms: only --method lgh" render no-such.glb --method path --target-ms 100
+refuses 1 "--target-error: only --method lgh" render no-such.glb --method vpl --target-error 0.1
+refuses 1 "expected indirect light with shadows" render no-such.glb --target-ms 100 --only direct
+refuses 1 "--target-error" render no-such.glb --target-error 2
+# Far more time than 500 VPLs take: more is chosen, said and written down.
+renders "$cornell" --size 64x36 --vpls 500 --target-ms 2000 --frames 9 -o auto.png --stats auto.json
+grep -q "automatic: frame [0-9]*: [0-9]* VPLs, alpha .* are less than 2000" "$work/stderr" ||
+  fail "--target-ms 2000 does not say what it chose: $(cat "$work/stderr")"
+[ "$(number vpls auto.json)" -gt 500 ] || fail "--target-ms 2000 chose no more than 500 VPLs"
+grep -q '"frame_ms":' auto.json || fail "--target-ms: no times of the frames in --stats"
+rm -f auto.*
+
 echo "options that do not fit the method are refused before any work"
 refuses 1 "--state: --method lgh" render no-such.glb --state a.state
 refuses 1 "--state: --method ir" render no-such.glb --method ir --state a.state

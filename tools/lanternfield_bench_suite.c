@@ -273,6 +273,11 @@ static const setting_info *option_find(const reader *reader, const char *place, 
     const setting_info *const info = settings_find(name);
     if (!info) {
         refuse(reader, place, "unknown option; see lanternfield render --help");
+        return NULL;
+    }
+    if (strcmp(name, "target-ms") == 0 || strcmp(name, "target-error") == 0) {
+        refuse(reader, place, "a row of a suite has the settings that it names; automatic ones are for render alone");
+        return NULL;
     }
     return info;
 }

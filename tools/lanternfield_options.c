@@ -1,6 +1,8 @@
 // The options of `lanternfield render`: those of the settings' table, and what concerns one run of the command.
 #include "lanternfield.h"
 
+#include "modules/automatic.h"
+
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -256,18 +258,24 @@ void render_help_print(FILE *out)
     }
     char names[160];
     aov_names_print(names, sizeof(names));
-    fprintf(out,
-            "\nParts of the picture (--aov): %s\n"
-            "  depth is in metres along the view, 0 where nothing is; direct and indirect (unshadowed) are in nits;\n"
-            "  normal is in world space; shadow-u, shadow-s and shadow-ratio are the estimates behind the shadows.\n"
-            "  Methods other than lgh make albedo, normal and depth only.\n"
-            "\nThe references (--method path, vpl) get better until they have all their samples or VPLs, or are as\n"
-            "good as --until asks, and take as many frames as that needs. With --state FILE they go on where they\n"
-            "were stopped, killed or finished; FILE is saved every few seconds. Settings that a method does not\n"
-            "read change nothing.\n"
-            "\nCtrl-C writes what there is. Exit codes: 0 done, 1 failed (also a value that cannot be used),\n"
-            "2 wrong usage, 130 interrupted.\n",
-            names);
+    fprintf(
+        out,
+        "\nParts of the picture (--aov): %s\n"
+        "  depth is in metres along the view, 0 where nothing is; direct and indirect (unshadowed) are in nits;\n"
+        "  normal is in world space; shadow-u, shadow-s and shadow-ratio are the estimates behind the shadows.\n"
+        "  Methods other than lgh make albedo, normal and depth only.\n"
+        "\nThe references (--method path, vpl) get better until they have all their samples or VPLs, or are as\n"
+        "good as --until asks, and take as many frames as that needs. With --state FILE they go on where they\n"
+        "were stopped, killed or finished; FILE is saved every few seconds. Settings that a method does not\n"
+        "read change nothing.\n"
+        "\n--target-ms and --target-error choose vpls, alpha, interleave, shadow-samples and ray-budget from where\n"
+        "these are set, say so whenever they change them, and end when they have settled, or after --frames\n"
+        "(default 60 and 600). The error is the relative L2 error of the indirect light, estimated at probe\n"
+        "pixels against all VPLs with shadow rays, with the noise of the VPLs themselves. --target-ms depends on\n"
+        "measured times, so two runs may differ; --target-error does not.\n"
+        "\nCtrl-C writes what there is. Exit codes: 0 done, 1 failed (also a value that cannot be used),\n"
+        "2 wrong usage, 130 interrupted.\n",
+        names);
 }
 
 // ---- Reading the command line
@@ -348,6 +356,11 @@ static bool request_fits_method(const render_request *request)
         log_error("--only %s: --method %s has no unshadowed light", only, method);
         return false;
     }
+    const char *const refusal = automatic_refusal(settings);
+    if (refusal) {
+        log_error("%s", refusal);
+        return false;
+    }
     for (uint32_t i = 0; i < request->aov_count; i++) {
         const struct aov_info *const aov = request->aovs[i].aov;
         if (!aov_is_made_by(aov, settings->method)) {
@@ -358,9 +371,20 @@ static bool request_fits_method(const render_request *request)
     return true;
 }
 
+// Where --frames is not given. Automatic settings end by themselves, so it only says when to give up.
+static void frames_complete(render_settings *settings)
+{
+    if (settings->frames == 0) {
+        settings->frames = settings->target_ms > 0      ? 60
+                           : settings->target_error > 0 ? 600
+                                                        : render_settings_default().frames;
+    }
+}
+
 int render_options_read(int argc, char **argv, render_request *request)
 {
     *request = (render_request){.settings = render_settings_default()};
+    request->settings.frames = 0; // not given
     for (int i = 0; i < argc; i++) {
         if (strcmp(argv[i], "--help") == 0 || strcmp(argv[i], "-h") == 0) {
             request->help = true;
@@ -383,6 +407,7 @@ int render_options_read(int argc, char **argv, render_request *request)
         log_error("render needs a SCENE%s", usage_hint);
         return EXIT_WRONG_USAGE;
     }
+    frames_complete(&request->settings);
     if (request->output_count == 0) {
         request->outputs[request->output_count++] = "out.png";
     }

@@ -1,6 +1,7 @@
 // `lanternfield render`: loads a scene, renders its frames and writes what was asked for.
 #include "lanternfield.h"
 
+#include "modules/automatic_system.h"
 #include "modules/rays.h"
 #include "modules/world.h"
 
@@ -281,20 +282,43 @@ static bool frame_render(render_state *state, bool timed)
     return state->frames_done++ > 0 || first_frame_check(state);
 }
 
+// Whether automatic settings came to where they should.
+static void automatic_tell(const renderer *r)
+{
+    const automatic *const a = automatic_get(r);
+    if (!a) {
+        return;
+    }
+    const double ms = automatic_milliseconds(a), error = automatic_error(a, NULL);
+    const char *const state = a->settled ? "" : ", not settled yet";
+    if (a->age < AUTOMATIC_WINDOW) {
+        log_info("automatic: only %u frames since the last change; more --frames would tell what it brings", a->age);
+    } else if (a->target_ms > 0) {
+        log_info("automatic: %.0f ms a frame for --target-ms %g, estimated error %.3f%s", ms, a->target_ms, error,
+                 state);
+    } else {
+        log_info("automatic: estimated error %.3f for --target-error %g%s", automatic_probes_error(&a->probes, NULL),
+                 a->target_error, state);
+    }
+}
+
 static bool settling_frames_render(render_state *state)
 {
     renderer *const r = state->session.renderer;
     // Instant radiosity has no history to settle.
     const uint32_t frames = r->settings.method == METHOD_IR ? 1 : r->settings.frames;
     const bool wants_count = wants_light_count(state->request);
-    while (state->frames_done < frames && !interrupted) {
+    bool last = false;
+    while (!last && !interrupted) {
         progress_show_frame(state->frames_done, frames, state->seconds);
+        last = state->frames_done + 1 == frames || (automatic_get(r) && automatic_get(r)->settled);
         // Counting costs time, so only the last frame does, and is left out of the timings.
-        r->count_lights = wants_count && state->frames_done + 1 == frames;
+        r->count_lights = wants_count && last;
         if (!frame_render(state, !r->count_lights || frames == 1)) {
             return false;
         }
     }
+    automatic_tell(r);
     return frames == 1 || aovs_check(state);
 }
 

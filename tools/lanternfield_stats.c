@@ -1,6 +1,8 @@
 // Timings over the frames, and the statistics file.
 #include "lanternfield.h"
 
+#include "modules/automatic_system.h"
+
 #include <cjson/cJSON.h>
 #include <math.h>
 #include <stdlib.h>
@@ -288,6 +290,38 @@ static void progress_to_json(cJSON *root, const render_settings *settings, const
     cJSON_AddNumberToObject(object, "mrays_per_second", 1e-6 * rays / summary->seconds);
 }
 
+static void number_or_null_to_json(cJSON *object, const char *key, double value)
+{
+    if (isfinite(value)) {
+        cJSON_AddNumberToObject(object, key, value);
+    } else {
+        cJSON_AddNullToObject(object, key);
+    }
+}
+
+// What automatic settings (the chosen ones are under "settings") know of the picture, and the time of every frame, in
+// order, so that one sees how they got there.
+static void automatic_to_json(cJSON *root, const renderer *r, const render_times *times)
+{
+    const automatic *const a = automatic_get(r);
+    if (!a) {
+        return;
+    }
+    double parts[AUTOMATIC_PARTS], standard_error;
+    cJSON *const object = cJSON_AddObjectToObject(root, "automatic");
+    cJSON_AddBoolToObject(object, "settled", a->settled);
+    cJSON_AddNumberToObject(object, "changes", a->changes);
+    cJSON_AddNumberToObject(object, "ms", automatic_milliseconds(a));
+    cJSON_AddNumberToObject(object, "modelled_error", automatic_error(a, parts));
+    cJSON_AddNumberToObject(object, "modelled_error_hierarchy", parts[AUTOMATIC_HIERARCHY]);
+    cJSON_AddNumberToObject(object, "modelled_error_shadows", parts[AUTOMATIC_SHADOW_RATIO]);
+    cJSON_AddNumberToObject(object, "modelled_error_vpls", parts[AUTOMATIC_VPL_SET]);
+    number_or_null_to_json(object, "measured_error", automatic_probes_error(&a->probes, &standard_error));
+    number_or_null_to_json(object, "measured_error_sigma", standard_error);
+    const time_series *const frames = &times->frames;
+    cJSON_AddItemToObject(object, "frame_ms", cJSON_CreateDoubleArray(frames->milliseconds, (int)frames->count));
+}
+
 static cJSON *stats_to_json(renderer *r, const render_summary *summary)
 {
     cJSON *const root = cJSON_CreateObject();
@@ -305,6 +339,7 @@ static cJSON *stats_to_json(renderer *r, const render_summary *summary)
     if (summary->progress) {
         progress_to_json(root, &r->settings, summary);
     }
+    automatic_to_json(root, r, summary->times);
     passes_to_json(root, summary->times);
     cJSON *const flux = cJSON_CreateObject();
     vpls_to_json(root, flux, r);
