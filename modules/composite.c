@@ -31,7 +31,7 @@ static void composite_run(const frame_graph_context *context, void *user)
     const composite_state *state = user;
     const render_settings *settings = &state->r->settings;
     frame_graph_bind(context, state->pipeline);
-    gpu_dispatch(context->commands, div_up_u32(settings->width, 8), div_up_u32(settings->height, 8), 1);
+    gpu_dispatch(context->commands, div_up_u32(settings->width, PIXEL_GROUP_WIDTH), settings->height, 1);
 }
 
 // One pass that makes the image `target` of the given parts; what is left out or absent is read as black, absent ratios
@@ -47,9 +47,9 @@ static void composite_declare(renderer *r, composite_state *state, const char *n
         parts & PART_EMISSION ? "emission" : "black",
         direct ? "direct|black" : "black",
         direct ? "direct_analytic|direct_u_filtered|direct_u|black" : "black",
-        direct ? "direct_ratio|white" : "white",
+        direct ? "direct_ratio|direct_ratio_now|white" : "white",
         indirect ? "indirect_gathered|indirect|black" : "black",
-        parts & PART_INDIRECT_SHADOWS ? "shadow_ratio|white" : "white",
+        parts & PART_INDIRECT_SHADOWS ? "shadow_ratio|shadow_ratio_now|white" : "white",
     };
     for (size_t i = 0; i < countof(uses); i++)
         frame_graph_read(pass, uses[i], ACCESS_SAMPLED);

@@ -14,10 +14,11 @@ void interleave_fini(gpu *gpu, interleave *state);
 // `n` x `n` tiles, n > 1.
 void interleave_declare(const interleave *state, frame_graph *graph, uint32_t width, uint32_t height, uint32_t n);
 
-// ---- SVGF: `depth`, `normals`, `motion`, X_u and X_s to X_u_filtered and X_s_filtered, whose alpha channels hold the
-// variances that the filter estimates to remain: of the luminance in U, of the ratio S / U in S.
+// ---- SVGF: `depth`, `normals`, `motion`, X_u and X_s to X_ratio_now; also to X_u_filtered and X_s_filtered, whose
+// alpha channels hold the variances that the filter estimates to remain: of the luminance in U, of the ratio S / U in
+// S.
 typedef struct svgf {
-    gpu_pipeline geometry, temporal, variance, atrous;
+    gpu_pipeline geometry, temporal, variance, atrous, atrous_ratio, atrous_last;
 } svgf;
 
 bool svgf_create(gpu *gpu, svgf *state);
@@ -29,11 +30,13 @@ void svgf_declare_geometry(const svgf *state, frame_graph *graph, uint32_t width
 void svgf_declare(const svgf *state, frame_graph *graph, uint32_t width, uint32_t height, const char *pair,
                   uint32_t interleave, bool light_shown);
 
-// ---- TAA: X_u_filtered|X_u and X_s_filtered|X_s, with `depth`, `normals` and `motion` when `history`, to X_ratio.
+// ---- TAA: X_ratio_now, with `depth`, `normals` and `motion`, to X_ratio.
 typedef struct taa {
     gpu_pipeline blend, plain;
 } taa;
 
 bool taa_create(gpu *gpu, taa *state);
 void taa_fini(gpu *gpu, taa *state);
-void taa_declare(const taa *state, frame_graph *graph, uint32_t width, uint32_t height, const char *pair, bool history);
+// Makes X_ratio_now from X_u and X_s where no filter does.
+void taa_declare_ratio(const taa *state, frame_graph *graph, uint32_t width, uint32_t height, const char *pair);
+void taa_declare(const taa *state, frame_graph *graph, uint32_t width, uint32_t height, const char *pair);

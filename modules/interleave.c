@@ -7,22 +7,25 @@
 typedef struct interleave_dispatch {
     gpu_pipeline pipeline;
     uint32_t width, height;
-    uint32_t n;
+    struct {
+        uint32_t n;
+        uint32_t down; // along y; 0: along x
+    } push;
 } interleave_dispatch;
 
 static void interleave_execute(const frame_graph_context *context, void *user)
 {
     const interleave_dispatch *d = user;
     frame_graph_bind(context, d->pipeline);
-    gpu_push(context->commands, &d->n, sizeof d->n);
-    gpu_dispatch(context->commands, div_up_u32(d->width, 8), div_up_u32(d->height, 8), 1);
+    gpu_push(context->commands, &d->push, sizeof d->push);
+    gpu_dispatch(context->commands, div_up_u32(d->width, PIXEL_GROUP_WIDTH), d->height, 1);
 }
 
-void interleave_declare(const interleave *state, frame_graph *graph, uint32_t width, uint32_t height, uint32_t n)
+static void axis_declare(frame_graph *graph, interleave_dispatch dispatch, const char *name, const char *from,
+                         const char *to)
 {
-    interleave_dispatch dispatch = {state->pipeline, width, height, n};
     const frame_graph_pass_desc desc = {
-        .name = "interleave",
+        .name = name,
         .kind = FRAME_GRAPH_COMPUTE,
         .execute = interleave_execute,
         .user = &dispatch,
@@ -31,9 +34,18 @@ void interleave_declare(const interleave *state, frame_graph *graph, uint32_t wi
     frame_graph_pass *pass = frame_graph_pass_add(graph, &desc);
     frame_graph_read(pass, "filter_geometry", ACCESS_STORAGE_READ);
     frame_graph_read(pass, "normals", ACCESS_SAMPLED);
-    frame_graph_read(pass, "indirect", ACCESS_STORAGE_READ);
-    const frame_graph_resource_desc image = frame_graph_image_of(VK_FORMAT_R32G32B32A32_SFLOAT, width, height);
-    frame_graph_create_resource(pass, "indirect_gathered", &image, ACCESS_STORAGE_WRITE);
+    frame_graph_read(pass, from, ACCESS_STORAGE_READ);
+    const frame_graph_resource_desc image =
+        frame_graph_image_of(VK_FORMAT_R32G32B32A32_SFLOAT, dispatch.width, dispatch.height);
+    frame_graph_create_resource(pass, to, &image, ACCESS_STORAGE_WRITE);
+}
+
+void interleave_declare(const interleave *state, frame_graph *graph, uint32_t width, uint32_t height, uint32_t n)
+{
+    interleave_dispatch dispatch = {state->pipeline, width, height, {.n = n}};
+    axis_declare(graph, dispatch, "interleave/across", "indirect", "indirect_across");
+    dispatch.push.down = 1;
+    axis_declare(graph, dispatch, "interleave/down", "indirect_across", "indirect_gathered");
 }
 
 bool interleave_create(gpu *gpu, interleave *state)

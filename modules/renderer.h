@@ -37,8 +37,9 @@
 //                                    U.a: 1 where the pixel has light but no sample in this frame, else 0
 //   shadow_plan        uint[pixels]  for the ray budget, with shadow_budget: see shadow_budget.glsl.h  shadow
 //   filter_geometry    RGBA32F       shading normal and view depth, 0 where nothing is; for filters  svgf
-//   X_u_filtered, X_s_filtered       for X = shadow, direct                            svgf
-//   X_ratio            RGBA16F       S / U in [0,1], after TAA where it is on          taa
+//   X_u_filtered, X_s_filtered       for X = shadow, direct; made when somebody reads them   svgf
+//   X_ratio_now        RGBA16F       S / U in [0,1]; a: standard deviation left        svgf; taa where unfiltered
+//   X_ratio            RGBA16F       the same after TAA, where it is on; a: frames     taa
 //   radiance           RGBA32F       nits                    composite; progressive for the other methods
 //   aov_direct, aov_indirect  RGBA32F  their parts of `radiance`, when exported, lgh alone  composite
 //   sums_before, sums  vec4[2][pixels]  the references' light before and after this frame; see progressive.h

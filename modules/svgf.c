@@ -30,7 +30,7 @@ typedef struct svgf_dispatch {
 
 static void image_dispatch(const frame_graph_context *context, const svgf_dispatch *d)
 {
-    gpu_dispatch(context->commands, div_up_u32(d->width, 8), div_up_u32(d->height, 8), 1);
+    gpu_dispatch(context->commands, div_up_u32(d->width, PIXEL_GROUP_WIDTH), d->height, 1);
 }
 
 static void plain_execute(const frame_graph_context *context, void *user)
@@ -87,9 +87,10 @@ static pair_name named(const char *pair, const char *suffix)
     return name;
 }
 
-static void image_create(frame_graph_pass *pass, const char *pair, const char *suffix, const svgf_dispatch *d)
+static void image_create(frame_graph_pass *pass, const char *pair, const char *suffix, VkFormat format,
+                         const svgf_dispatch *d)
 {
-    const frame_graph_resource_desc image = frame_graph_image_of(VK_FORMAT_R32G32B32A32_SFLOAT, d->width, d->height);
+    const frame_graph_resource_desc image = frame_graph_image_of(format, d->width, d->height);
     frame_graph_create_resource(pass, named(pair, suffix).text, &image, ACCESS_STORAGE_WRITE);
 }
 
@@ -99,7 +100,7 @@ void svgf_declare_geometry(const svgf *state, frame_graph *graph, uint32_t width
     frame_graph_pass *pass = svgf_pass_add(graph, "svgf/geometry", &dispatch, plain_execute);
     frame_graph_read(pass, "depth", ACCESS_SAMPLED);
     frame_graph_read(pass, "normals", ACCESS_SAMPLED);
-    image_create(pass, "filter_geometry", "", &dispatch);
+    image_create(pass, "filter_geometry", "", VK_FORMAT_R32G32B32A32_SFLOAT, &dispatch);
 }
 
 static void temporal_declare(const svgf *state, frame_graph *graph, svgf_dispatch dispatch, const char *pair)
@@ -113,13 +114,15 @@ static void temporal_declare(const svgf *state, frame_graph *graph, svgf_dispatc
     frame_graph_read(pass, "motion", ACCESS_SAMPLED);
     frame_graph_read_previous(pass, "depth", ACCESS_SAMPLED);
     frame_graph_read_previous(pass, "normals", ACCESS_SAMPLED);
+    frame_graph_read(pass, "filter_geometry", ACCESS_STORAGE_READ);
     frame_graph_read(pass, named(pair, "_u").text, ACCESS_STORAGE_READ);
     frame_graph_read(pass, named(pair, "_s").text, ACCESS_STORAGE_READ);
     for (size_t i = 0; i < countof(accumulated); i++)
         frame_graph_read_previous(pass, named(pair, accumulated[i]).text, ACCESS_STORAGE_READ);
+    frame_graph_read_previous(pass, named(pair, "_means").text, ACCESS_STORAGE_READ);
     for (size_t i = 0; i < countof(accumulated); i++)
-        image_create(pass, pair, accumulated[i], &dispatch);
-    frame_graph_read(pass, "filter_geometry", ACCESS_STORAGE_READ);
+        image_create(pass, pair, accumulated[i], VK_FORMAT_R32G32B32A32_SFLOAT, &dispatch);
+    image_create(pass, pair, "_pair", VK_FORMAT_R32G32B32A32_UINT, &dispatch);
 }
 
 static void variance_declare(const svgf *state, frame_graph *graph, svgf_dispatch dispatch, const char *pair)
@@ -128,24 +131,19 @@ static void variance_declare(const svgf *state, frame_graph *graph, svgf_dispatc
     frame_graph_pass *pass = svgf_pass_add(graph, named("svgf/variance_", pair).text, &dispatch, plain_execute);
     frame_graph_read(pass, "filter_geometry", ACCESS_STORAGE_READ);
     frame_graph_read(pass, "normals", ACCESS_SAMPLED);
-    frame_graph_read(pass, named(pair, "_u_accumulated").text, ACCESS_STORAGE_READ);
-    frame_graph_read(pass, named(pair, "_s_accumulated").text, ACCESS_STORAGE_READ);
     frame_graph_read(pass, named(pair, "_moments").text, ACCESS_STORAGE_READ);
-    image_create(pass, pair, "_u_filter0", &dispatch);
-    image_create(pass, pair, "_s_filter0", &dispatch);
+    frame_graph_read(pass, named(pair, "_pair").text, ACCESS_STORAGE_READ);
+    image_create(pass, pair, "_pair0", VK_FORMAT_R32G32B32A32_UINT, &dispatch);
+    image_create(pass, pair, "_means", VK_FORMAT_R32G32_SFLOAT, &dispatch);
 }
 
-static void atrous_declare(const svgf *state, frame_graph *graph, svgf_dispatch dispatch, const char *pair,
-                           int iteration)
+// `suffix` completes the pass's name. What it makes is left to the caller.
+static frame_graph_pass *atrous_declare(frame_graph *graph, svgf_dispatch dispatch, const char *pair, int iteration,
+                                        const char *suffix)
 {
-    // By iteration; what one writes the next one reads.
-    static const char *const u[ITERATIONS + 1] = {"_u_filter0", "_u_filter1", "_u_filter2",
-                                                  "_u_filter3", "_u_filter4", "_u_filtered"};
-    static const char *const s[ITERATIONS + 1] = {"_s_filter0", "_s_filter1", "_s_filter2",
-                                                  "_s_filter3", "_s_filter4", "_s_filtered"};
-    char name[64];
-    snprintf(name, sizeof name, "svgf/atrous_%s_%d", pair, iteration);
-    dispatch.pipeline = state->atrous;
+    char name[64], from[64];
+    snprintf(name, sizeof name, "svgf/atrous_%s_%d%s", pair, iteration, suffix);
+    snprintf(from, sizeof from, "%s_pair%d", pair, iteration);
     dispatch.atrous.step = 1 << iteration;
     // The tiles of interleaving sample different lights, which neither is noise nor may be seen: the kernels of the
     // steps below n, unstopped by values, cancel all that repeats every n pixels.
@@ -153,10 +151,26 @@ static void atrous_declare(const svgf *state, frame_graph *graph, svgf_dispatch 
     frame_graph_pass *pass = svgf_pass_add(graph, name, &dispatch, atrous_execute);
     frame_graph_read(pass, "filter_geometry", ACCESS_STORAGE_READ);
     frame_graph_read(pass, "normals", ACCESS_SAMPLED);
-    frame_graph_read(pass, named(pair, u[iteration]).text, ACCESS_STORAGE_READ);
-    frame_graph_read(pass, named(pair, s[iteration]).text, ACCESS_STORAGE_READ);
-    image_create(pass, pair, u[iteration + 1], &dispatch);
-    image_create(pass, pair, s[iteration + 1], &dispatch);
+    frame_graph_read(pass, from, ACCESS_STORAGE_READ);
+    return pass;
+}
+
+// The last iteration has two forms, for the ratio and for the pair; the graph culls the one that nobody reads.
+static void iterations_declare(const svgf *state, frame_graph *graph, svgf_dispatch dispatch, const char *pair)
+{
+    dispatch.pipeline = state->atrous;
+    for (int i = 0; i < ITERATIONS - 1; i++) {
+        char to[16];
+        snprintf(to, sizeof to, "_pair%d", i + 1);
+        image_create(atrous_declare(graph, dispatch, pair, i, ""), pair, to, VK_FORMAT_R32G32B32A32_UINT, &dispatch);
+    }
+    dispatch.pipeline = state->atrous_ratio;
+    frame_graph_pass *ratio = atrous_declare(graph, dispatch, pair, ITERATIONS - 1, "");
+    image_create(ratio, pair, "_ratio_now", VK_FORMAT_R16G16B16A16_SFLOAT, &dispatch);
+    dispatch.pipeline = state->atrous_last;
+    frame_graph_pass *last = atrous_declare(graph, dispatch, pair, ITERATIONS - 1, "_pair");
+    image_create(last, pair, "_u_filtered", VK_FORMAT_R32G32B32A32_SFLOAT, &dispatch);
+    image_create(last, pair, "_s_filtered", VK_FORMAT_R32G32B32A32_SFLOAT, &dispatch);
 }
 
 void svgf_declare(const svgf *state, frame_graph *graph, uint32_t width, uint32_t height, const char *pair,
@@ -171,20 +185,26 @@ void svgf_declare(const svgf *state, frame_graph *graph, uint32_t width, uint32_
     };
     temporal_declare(state, graph, dispatch, pair);
     variance_declare(state, graph, dispatch, pair);
-    for (int i = 0; i < ITERATIONS; i++)
-        atrous_declare(state, graph, dispatch, pair, i);
+    iterations_declare(state, graph, dispatch, pair);
+}
+
+static gpu_pipeline pipeline_of(gpu *gpu, const gpu_shader *shader)
+{
+    return gpu_compute_pipeline_create(gpu, &(gpu_compute_pipeline_desc){.shader = shader});
 }
 
 bool svgf_create(gpu *gpu, svgf *state)
 {
-    state->geometry =
-        gpu_compute_pipeline_create(gpu, &(gpu_compute_pipeline_desc){.shader = &shader_svgf_geometry_comp});
-    state->temporal =
-        gpu_compute_pipeline_create(gpu, &(gpu_compute_pipeline_desc){.shader = &shader_svgf_temporal_comp});
-    state->variance =
-        gpu_compute_pipeline_create(gpu, &(gpu_compute_pipeline_desc){.shader = &shader_svgf_variance_comp});
-    state->atrous = gpu_compute_pipeline_create(gpu, &(gpu_compute_pipeline_desc){.shader = &shader_svgf_atrous_comp});
-    return state->geometry.id && state->temporal.id && state->variance.id && state->atrous.id;
+    *state = (svgf){
+        .geometry = pipeline_of(gpu, &shader_svgf_geometry_comp),
+        .temporal = pipeline_of(gpu, &shader_svgf_temporal_comp),
+        .variance = pipeline_of(gpu, &shader_svgf_variance_comp),
+        .atrous = pipeline_of(gpu, &shader_svgf_atrous_comp),
+        .atrous_ratio = pipeline_of(gpu, &shader_svgf_atrous_ratio_comp),
+        .atrous_last = pipeline_of(gpu, &shader_svgf_atrous_last_comp),
+    };
+    return state->geometry.id && state->temporal.id && state->variance.id && state->atrous.id &&
+           state->atrous_ratio.id && state->atrous_last.id;
 }
 
 void svgf_fini(gpu *gpu, svgf *state)
@@ -193,6 +213,8 @@ void svgf_fini(gpu *gpu, svgf *state)
     gpu_pipeline_destroy(gpu, state->temporal);
     gpu_pipeline_destroy(gpu, state->variance);
     gpu_pipeline_destroy(gpu, state->atrous);
+    gpu_pipeline_destroy(gpu, state->atrous_ratio);
+    gpu_pipeline_destroy(gpu, state->atrous_last);
 }
 
 // ---- The module

@@ -1,5 +1,5 @@
-// The shadow ratio S / U of each pair, steadied over time where settings.taa asks for it. Only the ratio: the
-// unshadowed light has no noise to remove, and blending it would make it lag.
+// The shadow ratio S / U of each pair, and where settings.taa asks for it the same steadied over time. Only the ratio:
+// the unshadowed light has no noise to remove, and blending it would make it lag.
 #include "direct_light.h"
 #include "filters.h"
 #include "modules.h"
@@ -11,7 +11,7 @@
 typedef struct taa_dispatch {
     gpu_pipeline pipeline;
     uint32_t width, height;
-    char ratio[64]; // the image made
+    char ratio[64]; // blend: the image made
 } taa_dispatch;
 
 static void blend_execute(const frame_graph_context *context, void *user)
@@ -20,49 +20,65 @@ static void blend_execute(const frame_graph_context *context, void *user)
     const uint32_t valid = frame_graph_history_valid(context, "depth") && frame_graph_history_valid(context, d->ratio);
     frame_graph_bind(context, d->pipeline);
     gpu_push(context->commands, &valid, sizeof valid);
-    gpu_dispatch(context->commands, div_up_u32(d->width, 8), div_up_u32(d->height, 8), 1);
+    gpu_dispatch(context->commands, div_up_u32(d->width, PIXEL_GROUP_WIDTH), d->height, 1);
 }
 
 static void plain_execute(const frame_graph_context *context, void *user)
 {
     const taa_dispatch *d = user;
     frame_graph_bind(context, d->pipeline);
-    gpu_dispatch(context->commands, div_up_u32(d->width, 8), div_up_u32(d->height, 8), 1);
+    gpu_dispatch(context->commands, div_up_u32(d->width, PIXEL_GROUP_WIDTH), d->height, 1);
 }
 
-static void surfaces_read(frame_graph_pass *pass)
+static frame_graph_pass *taa_pass_add(frame_graph *graph, const char *name, const taa_dispatch *dispatch,
+                                      void (*execute)(const frame_graph_context *, void *))
 {
+    const frame_graph_pass_desc desc = {
+        .name = name,
+        .kind = FRAME_GRAPH_COMPUTE,
+        .execute = execute,
+        .user = (void *)dispatch, // copied
+        .user_size = sizeof *dispatch,
+    };
+    return frame_graph_pass_add(graph, &desc);
+}
+
+static void ratio_create(frame_graph_pass *pass, const char *name, uint32_t width, uint32_t height)
+{
+    const frame_graph_resource_desc image = frame_graph_image_of(VK_FORMAT_R16G16B16A16_SFLOAT, width, height);
+    frame_graph_create_resource(pass, name, &image, ACCESS_STORAGE_WRITE);
+}
+
+void taa_declare_ratio(const taa *state, frame_graph *graph, uint32_t width, uint32_t height, const char *pair)
+{
+    const taa_dispatch dispatch = {state->plain, width, height, ""};
+    char name[64], unshadowed[64], shadowed[64], ratio[64];
+    snprintf(name, sizeof name, "taa/ratio_%s", pair);
+    snprintf(unshadowed, sizeof unshadowed, "%s_u", pair);
+    snprintf(shadowed, sizeof shadowed, "%s_s", pair);
+    snprintf(ratio, sizeof ratio, "%s_ratio_now", pair);
+    frame_graph_pass *pass = taa_pass_add(graph, name, &dispatch, plain_execute);
+    frame_graph_read(pass, unshadowed, ACCESS_STORAGE_READ);
+    frame_graph_read(pass, shadowed, ACCESS_STORAGE_READ);
+    ratio_create(pass, ratio, width, height);
+}
+
+void taa_declare(const taa *state, frame_graph *graph, uint32_t width, uint32_t height, const char *pair)
+{
+    taa_dispatch dispatch = {state->blend, width, height, ""};
+    char name[64], ratio_now[64];
+    snprintf(dispatch.ratio, sizeof dispatch.ratio, "%s_ratio", pair);
+    snprintf(name, sizeof name, "taa/%s", pair);
+    snprintf(ratio_now, sizeof ratio_now, "%s_ratio_now", pair);
+    frame_graph_pass *pass = taa_pass_add(graph, name, &dispatch, blend_execute);
     frame_graph_read(pass, "depth", ACCESS_SAMPLED);
     frame_graph_read(pass, "normals", ACCESS_SAMPLED);
     frame_graph_read(pass, "motion", ACCESS_SAMPLED);
     frame_graph_read_previous(pass, "depth", ACCESS_SAMPLED);
     frame_graph_read_previous(pass, "normals", ACCESS_SAMPLED);
-}
-
-void taa_declare(const taa *state, frame_graph *graph, uint32_t width, uint32_t height, const char *pair, bool history)
-{
-    taa_dispatch dispatch = {history ? state->blend : state->plain, width, height, ""};
-    char name[64], unshadowed[64], shadowed[64];
-    snprintf(dispatch.ratio, sizeof dispatch.ratio, "%s_ratio", pair);
-    snprintf(name, sizeof name, "taa/%s", pair);
-    snprintf(unshadowed, sizeof unshadowed, "%s_u_filtered|%s_u", pair, pair);
-    snprintf(shadowed, sizeof shadowed, "%s_s_filtered|%s_s", pair, pair);
-    const frame_graph_pass_desc desc = {
-        .name = name,
-        .kind = FRAME_GRAPH_COMPUTE,
-        .execute = history ? blend_execute : plain_execute,
-        .user = &dispatch,
-        .user_size = sizeof dispatch,
-    };
-    frame_graph_pass *pass = frame_graph_pass_add(graph, &desc);
-    if (history)
-        surfaces_read(pass);
-    frame_graph_read(pass, unshadowed, ACCESS_STORAGE_READ);
-    frame_graph_read(pass, shadowed, ACCESS_STORAGE_READ);
-    if (history)
-        frame_graph_read_previous(pass, dispatch.ratio, ACCESS_STORAGE_READ);
-    const frame_graph_resource_desc image = frame_graph_image_of(VK_FORMAT_R16G16B16A16_SFLOAT, width, height);
-    frame_graph_create_resource(pass, dispatch.ratio, &image, ACCESS_STORAGE_WRITE);
+    frame_graph_read(pass, ratio_now, ACCESS_STORAGE_READ);
+    frame_graph_read_previous(pass, dispatch.ratio, ACCESS_STORAGE_READ);
+    ratio_create(pass, dispatch.ratio, width, height);
 }
 
 bool taa_create(gpu *gpu, taa *state)
@@ -80,13 +96,21 @@ void taa_fini(gpu *gpu, taa *state)
 
 // ---- The module
 
-static void taa_setup(renderer *r, void *state)
+static void pair_setup(renderer *r, const taa *state, const char *pair)
 {
     const render_settings *s = &r->settings;
+    if (!s->filter)
+        taa_declare_ratio(state, r->graph, s->width, s->height, pair);
+    if (s->taa)
+        taa_declare(state, r->graph, s->width, s->height, pair);
+}
+
+static void taa_setup(renderer *r, void *state)
+{
     if (renderer_has_shadows(r))
-        taa_declare(state, r->graph, s->width, s->height, "shadow", s->taa);
+        pair_setup(r, state, "shadow");
     if (direct_light_is_sampled(r))
-        taa_declare(state, r->graph, s->width, s->height, "direct", s->taa);
+        pair_setup(r, state, "direct");
 }
 
 static void taa_release(renderer *r, void *state)

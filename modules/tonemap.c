@@ -28,7 +28,7 @@ static void tonemap_run(const frame_graph_context *context, void *user)
     const tonemap_state *state = user;
     const render_settings *settings = &state->r->settings;
     frame_graph_bind(context, state->tonemap);
-    gpu_dispatch(context->commands, div_up_u32(settings->width, 8), div_up_u32(settings->height, 8), 1);
+    gpu_dispatch(context->commands, div_up_u32(settings->width, PIXEL_GROUP_WIDTH), settings->height, 1);
 }
 
 static frame_graph_pass *pass_add(frame_graph *graph, tonemap_state *state, const char *name,

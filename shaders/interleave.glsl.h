@@ -1,5 +1,5 @@
 // Interleaved sampling's tiled layout (Segovia et al. 2006): the pixels (x, y) of one residue (x mod n, y mod n) lie
-// together, so that neighbouring invocations walk the same lights. n = 1 is the identity.
+// together, so that neighbouring invocations walk the same lights. n is a power of two; 1 is the identity.
 #ifndef INTERLEAVE_GLSL_H
 #define INTERLEAVE_GLSL_H
 
@@ -9,7 +9,7 @@ uvec2 interleave_tile_size(uint n, uvec2 size) { return (size + n - 1u) / n; }
 // Where a pixel's value lies in the tiled image.
 uvec2 interleave_texel(uvec2 pixel, uint n, uvec2 size)
 {
-    return pixel % n * interleave_tile_size(n, size) + pixel / n;
+    return (pixel & (n - 1u)) * interleave_tile_size(n, size) + (pixel >> findMSB(n)); // no division for every pixel
 }
 
 // Whose value a texel of the tiled image is. Outside `size` for the padding of a size that n does not divide.

@@ -3,7 +3,7 @@
 #extension GL_GOOGLE_include_directive : require
 #include "gbuffer.glsl.h"
 
-layout(local_size_x = 8, local_size_y = 8) in;
+layout(local_size_x = PIXEL_GROUP_WIDTH) in;
 layout(set = 0, binding = 0) uniform sampler2D depth_map;
 layout(set = 0, binding = 1) uniform sampler2D normal_map;
 layout(set = 0, binding = 2, rgba32f) uniform writeonly image2D geometry_map;

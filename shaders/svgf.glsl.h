@@ -13,6 +13,9 @@
 // and 0.041, while what `agreement` cannot tell from noise takes 22, 46 and 94 frames to fade.
 const float SVGF_SHARE = 1.0 / 16.0;
 
+// Frames below which a variance over time means nothing.
+const float SVGF_TEMPORAL_FRAMES = 4.0;
+
 // Independent frames that a history of `frames` frames is worth.
 float svgf_frames(float frames) { return clamp(frames, 1.0, 2.0 / SVGF_SHARE - 1.0); }
 
@@ -26,5 +29,17 @@ vec2 svgf_variance(float unshadowed, float shadowed, vec3 moments)
     float ratio = dot(vec3(r * r, -2.0 * r, 1.0), relative);
     return clamp(vec2(ratio, relative.x - 1.0), vec2(0.0), vec2(1.0, 1e3));
 }
+
+// ---- The pair between the steps of one frame: a word per channel, U's upper 16 bits and S's (float32 cut to 8 bits of
+// precision, as bfloat16). One load a tap in place of two; rounding is monotonous, so S <= U stays true.
+// In alpha the variances: of U, and of the ratio.
+
+uvec4 pair_pack(vec4 unshadowed, vec4 shadowed)
+{
+    uvec4 u = floatBitsToUint(min(unshadowed, 3e38)) + 0x8000u, s = floatBitsToUint(min(shadowed, 3e38)) + 0x8000u;
+    return (u & 0xffff0000u) | (s >> 16);
+}
+vec4 pair_unshadowed(uvec4 pair) { return uintBitsToFloat(pair & 0xffff0000u); }
+vec4 pair_shadowed(uvec4 pair) { return uintBitsToFloat(pair << 16); }
 
 #endif

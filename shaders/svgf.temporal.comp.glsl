@@ -5,40 +5,40 @@
 #include "reproject.glsl.h"
 #include "svgf.glsl.h"
 
-layout(local_size_x = 8, local_size_y = 8) in;
+layout(local_size_x = PIXEL_GROUP_WIDTH) in;
 layout(set = 0, binding = 0) uniform sampler2D depth_map;
 layout(set = 0, binding = 1) uniform sampler2D normal_map;
 layout(set = 0, binding = 2) uniform sampler2D motion_map;
 layout(set = 0, binding = 3) uniform sampler2D previous_depth;
 layout(set = 0, binding = 4) uniform sampler2D previous_normals;
-layout(set = 0, binding = 5, rgba32f) uniform readonly image2D unshadowed_map;
-layout(set = 0, binding = 6, rgba32f) uniform readonly image2D shadowed_map;
-layout(set = 0, binding = 7, rgba32f) uniform readonly image2D previous_unshadowed;
-layout(set = 0, binding = 8, rgba32f) uniform readonly image2D previous_shadowed;
-layout(set = 0, binding = 9, rgba32f) uniform readonly image2D previous_moments;
-layout(set = 0, binding = 10, rgba32f) uniform writeonly image2D accumulated_unshadowed;
-layout(set = 0, binding = 11, rgba32f) uniform writeonly image2D accumulated_shadowed;
-layout(set = 0, binding = 12, rgba32f) uniform writeonly image2D accumulated_moments;
-layout(set = 0, binding = 13, rgba32f) uniform readonly image2D geometry_map;
+layout(set = 0, binding = 5, rgba32f) uniform readonly image2D geometry_map;
+layout(set = 0, binding = 6, rgba32f) uniform readonly image2D unshadowed_map;
+layout(set = 0, binding = 7, rgba32f) uniform readonly image2D shadowed_map;
+layout(set = 0, binding = 8, rgba32f) uniform readonly image2D previous_unshadowed;
+layout(set = 0, binding = 9, rgba32f) uniform readonly image2D previous_shadowed;
+layout(set = 0, binding = 10, rgba32f) uniform readonly image2D previous_moments;
+layout(set = 0, binding = 11, rg32f) uniform readonly image2D previous_means;
+layout(set = 0, binding = 12, rgba32f) uniform writeonly image2D accumulated_unshadowed;
+layout(set = 0, binding = 13, rgba32f) uniform writeonly image2D accumulated_shadowed;
+layout(set = 0, binding = 14, rgba32f) uniform writeonly image2D accumulated_moments;
+layout(set = 0, binding = 15, rgba32ui) uniform writeonly uimage2D out_pair;
 layout(push_constant, scalar) uniform push_block {
     uint history_valid;
     uint light_shown; // 1: U is shown, not only the ratio
 } push;
 
 struct accumulated {
-    vec4 unshadowed, shadowed;
+    vec3 unshadowed, shadowed;
     vec4 moments; // UU, SU, SS, and the number of frames
 };
 
-// The pixels around on the same surface, this one included, in this frame and in the history.
+// This frame's pixels around on the same surface, this one included.
 struct surroundings {
-    float count;
-    vec2 now, before;          // sums of the luminances of U and S
-    vec3 moments;              // sums of UU, SU, SS in this frame
-    float brightest_neighbour; // of U in this frame; on any surface
+    float count;   // sum of the weights; 0: no sample around
+    vec2 means;    // of the luminances of U and S
+    vec3 moments;  // means of UU, SU, SS
+    float brightest_neighbour; // of U; on any surface
 };
-
-bool inside(ivec2 pixel) { return all(lessThan(uvec2(pixel), uvec2(frame.width, frame.height))); }
 
 vec2 pair_now(ivec2 pixel)
 {
@@ -47,27 +47,27 @@ vec2 pair_now(ivec2 pixel)
 
 bool is_sampled(ivec2 pixel) { return imageLoad(unshadowed_map, pixel).a == 0.0; }
 
-// `past` is the pixel's place in the last frame.
-surroundings surroundings_of(ivec2 pixel, ivec2 past, gbuffer_point point)
+surroundings surroundings_of(ivec2 pixel, gbuffer_point point)
 {
+    uvec2 size = uvec2(frame.width, frame.height);
     filter_center center = filter_center_of(pixel, vec4(point.shading, point.view_z), point.geometric);
-    surroundings around = surroundings(0.0, vec2(0.0), vec2(0.0), vec3(0.0), 0.0);
+    surroundings around = surroundings(0.0, vec2(0.0), vec3(0.0), 0.0);
     for (int y = -1; y <= 1; y++)
         for (int x = -1; x <= 1; x++) {
-            ivec2 tap = pixel + ivec2(x, y), past_tap = past + ivec2(x, y);
-            if (!inside(tap) || !is_sampled(tap))
+            ivec2 tap = pixel + ivec2(x, y);
+            if (any(greaterThanEqual(uvec2(tap), size)) || !is_sampled(tap))
                 continue;
             vec2 now = pair_now(tap);
             if (x != 0 || y != 0)
                 around.brightest_neighbour = max(around.brightest_neighbour, now.x);
-            if (!inside(past_tap) || filter_geometry_weight(center, tap, imageLoad(geometry_map, tap)) < 0.5)
-                continue;
-            around.now += now;
-            around.moments += vec3(now.x * now.x, now.y * now.x, now.y * now.y);
-            around.before += vec2(luminance(imageLoad(previous_unshadowed, past_tap).rgb),
-                                  luminance(imageLoad(previous_shadowed, past_tap).rgb));
-            around.count += 1.0;
+            float weight = filter_geometry_weight(center, tap, imageLoad(geometry_map, tap));
+            around.count += weight;
+            around.means += weight * now;
+            around.moments += weight * vec3(now.x * now.x, now.y * now.x, now.y * now.y);
         }
+    // The pixel itself weighs about 1, where it has a sample.
+    around.means /= max(around.count, 1e-6);
+    around.moments /= max(around.count, 1e-6);
     return around;
 }
 
@@ -83,19 +83,22 @@ accumulated current(ivec2 pixel, float brightest_neighbour)
         s *= limit / peak;
     }
     float light = luminance(u), shadowed = luminance(s);
-    return accumulated(vec4(u, 0.0), vec4(s, 0.0), vec4(light * light, shadowed * light, shadowed * shadowed, 1.0));
+    return accumulated(u, s, vec4(light * light, shadowed * light, shadowed * shadowed, 1.0));
 }
 
-accumulated history(reprojection r)
+// `means`: luminances of U and S around, as the last frame had accumulated them.
+accumulated history(reprojection r, out vec2 means)
 {
-    accumulated sum = accumulated(vec4(0.0), vec4(0.0), vec4(0.0));
+    accumulated sum = accumulated(vec3(0.0), vec3(0.0), vec4(0.0));
+    means = vec2(0.0);
     for (int i = 0; i < 4; i++) {
         if (r.weights[i] == 0.0)
             continue;
         ivec2 tap = reprojection_tap(r, i);
-        sum.unshadowed += r.weights[i] * imageLoad(previous_unshadowed, tap);
-        sum.shadowed += r.weights[i] * imageLoad(previous_shadowed, tap);
+        sum.unshadowed += r.weights[i] * imageLoad(previous_unshadowed, tap).rgb;
+        sum.shadowed += r.weights[i] * imageLoad(previous_shadowed, tap).rgb;
         sum.moments += r.weights[i] * imageLoad(previous_moments, tap);
+        means += r.weights[i] * imageLoad(previous_means, tap).xy;
     }
     return sum;
 }
@@ -103,34 +106,33 @@ accumulated history(reprojection r)
 // How much of the history still holds, so that a change of light or of a shadow leaves no lag: 1 while what the
 // surroundings show now lies within three standard deviations of what they showed, 0 from five on (of a bright past even
 // a small rest would outshine what is dim now).
-float agreement(surroundings around, accumulated before)
+float agreement(surroundings around, accumulated before, vec2 means_before)
 {
     const float KEPT = 3.0 * 3.0, DROPPED = 5.0 * 5.0, TOLERANCE = 0.05;
-    if (around.before.x <= 0.0)
-        return around.now.x <= 0.0 ? 1.0 : 0.0;
+    if (means_before.x <= 0.0)
+        return around.means.x <= 0.0 ? 1.0 : 0.0;
     // The larger of what the pixel showed over time and of what the pixels around show now: either is too small by chance.
-    float u = luminance(before.unshadowed.rgb), s = luminance(before.shadowed.rgb), n = around.count;
-    vec2 variance = max(svgf_variance(u, s, before.moments.xyz),
-                        svgf_variance(around.now.x / n, around.now.y / n, around.moments / n));
-    variance *= (1.0 + 1.0 / svgf_frames(before.moments.w)) / n;
+    vec2 variance = max(svgf_variance(luminance(before.unshadowed), luminance(before.shadowed), before.moments.xyz),
+                        svgf_variance(around.means.x, around.means.y, around.moments));
+    variance *= (1.0 + 1.0 / svgf_frames(before.moments.w)) / around.count;
     // Nothing now may be chance, where few samples find light.
-    vec2 off = vec2(0.0, log(max(around.now.x / around.before.x, 0.01)));
-    if (around.now.x > 0.0)
-        off.x = around.now.y / around.now.x - around.before.y / around.before.x;
+    vec2 off = vec2(0.0, log(max(around.means.x / means_before.x, 0.01)));
+    if (around.means.x > 0.0)
+        off.x = around.means.y / around.means.x - means_before.y / means_before.x;
     vec2 squares = off * off / (variance + TOLERANCE * TOLERANCE);
     return clamp((DROPPED - max(squares.x, squares.y)) / (DROPPED - KEPT), 0.0, 1.0);
 }
 
-accumulated accumulate(ivec2 pixel, gbuffer_point point)
+accumulated accumulate(ivec2 pixel, gbuffer_point point, surroundings around)
 {
-    vec2 motion = texelFetch(motion_map, pixel, 0).xy;
-    surroundings around = surroundings_of(pixel, ivec2(floor(vec2(pixel) + motion + 0.5)), point);
     accumulated now = current(pixel, around.brightest_neighbour);
+    vec2 motion = texelFetch(motion_map, pixel, 0).xy;
     reprojection r;
     if (push.history_valid == 0u || !reproject(uvec2(pixel), point, motion, previous_depth, previous_normals, r))
-        return is_sampled(pixel) ? now : accumulated(vec4(0.0), vec4(0.0), vec4(0.0));
-    accumulated before = history(r);
-    float kept = around.count > 0.0 ? before.moments.w * agreement(around, before) : before.moments.w;
+        return is_sampled(pixel) ? now : accumulated(vec3(0.0), vec3(0.0), vec4(0.0));
+    vec2 means_before;
+    accumulated before = history(r, means_before);
+    float kept = before.moments.w * (around.count > 0.0 ? agreement(around, before, means_before) : 1.0);
     if (!is_sampled(pixel))
         return accumulated(before.unshadowed, before.shadowed, vec4(before.moments.xyz, kept));
     float frames = min(kept + 1.0, 2.0 / SVGF_SHARE);
@@ -139,16 +141,32 @@ accumulated accumulate(ivec2 pixel, gbuffer_point point)
                        vec4(mix(before.moments.xyz, now.moments.xyz, share), frames));
 }
 
+// Of U and of the ratio of what is accumulated: over time, and over the pixels around while there is little of that.
+vec2 variance_of(accumulated sum, surroundings around)
+{
+    float u = luminance(sum.unshadowed), s = luminance(sum.shadowed);
+    vec2 variance = sum.moments.w < SVGF_TEMPORAL_FRAMES
+                        ? svgf_variance(around.means.x, around.means.y, around.moments)
+                        : svgf_variance(u, s, sum.moments.xyz);
+    return vec2(variance.y * u * u, variance.x) / svgf_frames(sum.moments.w);
+}
+
 void main()
 {
     uvec2 pixel = gl_GlobalInvocationID.xy;
     if (any(greaterThanEqual(pixel, uvec2(frame.width, frame.height))))
         return;
-    accumulated result = accumulated(vec4(0.0), vec4(0.0), vec4(0.0));
+    accumulated result = accumulated(vec3(0.0), vec3(0.0), vec4(0.0));
+    uvec4 pair = uvec4(0u);
     gbuffer_point point;
-    if (gbuffer_read(depth_map, normal_map, pixel, point))
-        result = accumulate(ivec2(pixel), point);
-    imageStore(accumulated_unshadowed, ivec2(pixel), result.unshadowed);
-    imageStore(accumulated_shadowed, ivec2(pixel), result.shadowed);
+    if (gbuffer_read(depth_map, normal_map, pixel, point)) {
+        surroundings around = surroundings_of(ivec2(pixel), point);
+        result = accumulate(ivec2(pixel), point, around);
+        vec2 variance = variance_of(result, around);
+        pair = pair_pack(vec4(result.unshadowed, variance.x), vec4(result.shadowed, variance.y));
+    }
+    imageStore(accumulated_unshadowed, ivec2(pixel), vec4(result.unshadowed, 0.0));
+    imageStore(accumulated_shadowed, ivec2(pixel), vec4(result.shadowed, 0.0));
     imageStore(accumulated_moments, ivec2(pixel), result.moments);
+    imageStore(out_pair, ivec2(pixel), pair);
 }

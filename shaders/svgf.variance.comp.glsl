@@ -1,60 +1,53 @@
-// Variance of the accumulated pair, into the alpha channels: U.a = Var(U), S.a = Var(S / U). From the moments over
-// time, averaged over the nearest pixels since they are noisy themselves; from the moments over the neighbourhood in the
-// first frames after a disocclusion.
+// Smooths the variances in the pair's alpha channels, which are noisy themselves, over the pixels around, and writes the
+// mean luminances of the pair around, which the next frame compares with its own.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "svgf.glsl.h"
 
-layout(local_size_x = 8, local_size_y = 8) in;
+layout(local_size_x = PIXEL_GROUP_WIDTH) in;
 layout(set = 0, binding = 0, rgba32f) uniform readonly image2D geometry_map;
 layout(set = 0, binding = 1) uniform sampler2D normal_map;
-layout(set = 0, binding = 2, rgba32f) uniform readonly image2D unshadowed_map;
-layout(set = 0, binding = 3, rgba32f) uniform readonly image2D shadowed_map;
-layout(set = 0, binding = 4, rgba32f) uniform readonly image2D moments_map;
-layout(set = 0, binding = 5, rgba32f) uniform writeonly image2D out_unshadowed;
-layout(set = 0, binding = 6, rgba32f) uniform writeonly image2D out_shadowed;
+layout(set = 0, binding = 2, rgba32f) uniform readonly image2D moments_map;
+layout(set = 0, binding = 3, rgba32ui) uniform readonly uimage2D pair_map;
+layout(set = 0, binding = 4, rgba32ui) uniform writeonly uimage2D out_pair;
+layout(set = 0, binding = 5, rg32f) uniform writeonly image2D out_means;
 
-const float FRAMES_MIN = 4.0; // below, a variance over time means nothing
+struct smoothed {
+    vec2 means;    // luminances of U and S around
+    vec2 variance; // of U, and of the ratio
+};
 
-vec2 variance_at(ivec2 pixel, filter_center center, float frames)
+smoothed smooth_around(ivec2 pixel, filter_center center, uvec4 pair)
 {
-    bool spatial = frames < FRAMES_MIN;
-    int radius = spatial ? 3 : 1;
-    float weights = 0.0, u_sum = 0.0, s_sum = 0.0;
-    vec3 moments_sum = vec3(0.0);
-    vec2 temporal_sum = vec2(0.0);
-    float lowest = 1.0, highest = 0.0; // ratio around
-    for (int y = -radius; y <= radius; y++)
-        for (int x = -radius; x <= radius; x++) {
+    uvec2 size = uvec2(frame.width, frame.height);
+    // In the first frames each pixel's variance comes from the 3x3 pixels around: what is three pixels away has its own.
+    bool settled = imageLoad(moments_map, pixel).w >= SVGF_TEMPORAL_FRAMES;
+    int stride = settled ? 1 : 3;
+    float weights = 0.0, lowest = 1.0, highest = 0.0; // ratio around
+    vec2 means = vec2(0.0), variance = vec2(0.0);
+    for (int y = -stride; y <= stride; y += stride)
+        for (int x = -stride; x <= stride; x += stride) {
             ivec2 tap = pixel + ivec2(x, y);
-            if (any(greaterThanEqual(uvec2(tap), uvec2(frame.width, frame.height))))
+            if (any(greaterThanEqual(uvec2(tap), size)))
                 continue;
             float weight = filter_geometry_weight(center, tap, imageLoad(geometry_map, tap));
-            float u = luminance(imageLoad(unshadowed_map, tap).rgb), s = luminance(imageLoad(shadowed_map, tap).rgb);
+            uvec4 tap_pair = imageLoad(pair_map, tap);
+            vec4 unshadowed = pair_unshadowed(tap_pair), shadowed = pair_shadowed(tap_pair);
+            float u = luminance(unshadowed.rgb), s = luminance(shadowed.rgb);
             weights += weight;
-            u_sum += weight * u;
-            s_sum += weight * s;
-            if (spatial) {
-                moments_sum += weight * vec3(u * u, s * u, s * s);
-            } else {
-                vec4 moments = imageLoad(moments_map, tap);
-                temporal_sum += weight * svgf_variance(u, s, moments.xyz) * vec2(1.0, u * u) / svgf_frames(moments.w);
-                if ((x != 0 || y != 0) && weight > 0.5 && u > 0.0) {
-                    lowest = min(lowest, s / u);
-                    highest = max(highest, s / u);
-                }
+            means += weight * vec2(u, s);
+            variance += weight * vec2(unshadowed.a, shadowed.a);
+            if ((x != 0 || y != 0) && weight > 0.5 && u > 0.0) {
+                lowest = min(lowest, s / u);
+                highest = max(highest, s / u);
             }
         }
-    if (weights <= 0.0)
-        return vec2(1.0);
-    if (spatial) {
-        float u = u_sum / weights;
-        return svgf_variance(u, s_sum / weights, moments_sum / weights) * vec2(1.0, u * u);
-    }
+    smoothed result = smoothed(means / weights, variance / weights); // the pixel itself weighs about 1
     // A ratio beyond all those around is an error of its own (a ray that slips through a corner in every frame).
-    float r = shadow_ratio_luminance(imageLoad(unshadowed_map, pixel).rgb, imageLoad(shadowed_map, pixel).rgb);
-    float beyond = lowest <= highest ? max(r - highest, lowest - r) : 0.0;
-    return temporal_sum / weights + vec2(beyond > 0.0 ? beyond * beyond : 0.0, 0.0);
+    float r = shadow_ratio_luminance(pair_unshadowed(pair).rgb, pair_shadowed(pair).rgb);
+    float beyond = settled && lowest <= highest ? max(max(r - highest, lowest - r), 0.0) : 0.0;
+    result.variance.y += beyond * beyond;
+    return result;
 }
 
 void main()
@@ -63,14 +56,16 @@ void main()
     if (any(greaterThanEqual(uvec2(pixel), uvec2(frame.width, frame.height))))
         return;
     vec4 geometry = imageLoad(geometry_map, pixel);
-    vec4 unshadowed = vec4(0.0), shadowed = vec4(0.0);
+    uvec4 pair = uvec4(0u);
+    vec2 means = vec2(0.0);
     if (geometry.w > 0.0) {
         vec3 geometric = octahedral_decode(texelFetch(normal_map, pixel, 0).xy);
-        filter_center center = filter_center_of(pixel, geometry, geometric);
-        vec2 variance = variance_at(pixel, center, imageLoad(moments_map, pixel).w);
-        unshadowed = vec4(imageLoad(unshadowed_map, pixel).rgb, variance.y);
-        shadowed = vec4(imageLoad(shadowed_map, pixel).rgb, variance.x);
+        pair = imageLoad(pair_map, pixel);
+        smoothed around = smooth_around(pixel, filter_center_of(pixel, geometry, geometric), pair);
+        pair = pair_pack(vec4(pair_unshadowed(pair).rgb, around.variance.x),
+                         vec4(pair_shadowed(pair).rgb, around.variance.y));
+        means = around.means;
     }
-    imageStore(out_unshadowed, pixel, unshadowed);
-    imageStore(out_shadowed, pixel, shadowed);
+    imageStore(out_pair, pixel, pair);
+    imageStore(out_means, pixel, vec4(means, 0.0, 0.0));
 }

@@ -1,10 +1,10 @@
-// The shadow ratio S / U of this frame alone.
+// The shadow ratio S / U of an unfiltered pair.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "ratio.glsl.h"
 #include "scene.glsl.h"
 
-layout(local_size_x = 8, local_size_y = 8) in;
+layout(local_size_x = PIXEL_GROUP_WIDTH) in;
 layout(set = 0, binding = 0, rgba32f) uniform readonly image2D unshadowed_map;
 layout(set = 0, binding = 1, rgba32f) uniform readonly image2D shadowed_map;
 layout(set = 0, binding = 2, rgba16f) uniform writeonly image2D ratio_map;

@@ -3,7 +3,7 @@
 #extension GL_GOOGLE_include_directive : require
 #include "common.glsl.h"
 
-layout(local_size_x = 8, local_size_y = 8) in;
+layout(local_size_x = PIXEL_GROUP_WIDTH) in;
 
 layout(set = 0, binding = 0) uniform sampler2D radiance_map;
 layout(set = 0, binding = 1, scalar) readonly buffer exposure_block { float exposure; };

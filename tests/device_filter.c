@@ -201,7 +201,8 @@ static void taa_frame(stage *s, const texel *unshadowed, const texel *shadowed, 
     static uint16_t halves[TEXELS_MAX][4];
     frame_begin(s);
     pair_inject(s, unshadowed, shadowed);
-    taa_declare(&steadier, s->graph, s->width, s->height, "shadow", true);
+    taa_declare_ratio(&steadier, s->graph, s->width, s->height, "shadow");
+    taa_declare(&steadier, s->graph, s->width, s->height, "shadow");
     frame_graph_export(s->graph, "shadow_ratio", ACCESS_TRANSFER_READ);
     frame_end(s);
     const gpu_image image = frame_graph_find_image(s->graph, "shadow_ratio");
@@ -279,6 +280,28 @@ TEST(gathering_tiles_gives_their_mean)
         gather(s, n, value_of_tile, out);
         for (uint32_t i = 0; i < s->width * s->height; i++)
             CHECK_NEAR(out[i][0], 0.5 * (n * n - 1), 1e-5);
+        stage_destroy(s);
+    }
+}
+
+static float value_of_slope(uint32_t x, uint32_t y, uint32_t n)
+{
+    (void)y;
+    return (float)(x * (x % n));
+}
+
+// Each tile's light is linear over the picture, with a slope of its own.
+TEST(gathering_interpolates_each_tile)
+{
+    static texel out[TEXELS_MAX];
+    for (uint32_t n = 2; n <= 4; n *= 2) {
+        stage *s = stage_create(61, 47);
+        gather(s, n, value_of_slope, out);
+        for (uint32_t i = 0; i < s->width * s->height; i++) {
+            const uint32_t x = i % s->width;
+            if (x >= n && x + n < s->width)
+                CHECK_NEAR(out[i][0], 0.5 * (n - 1) * x, 1e-4);
+        }
         stage_destroy(s);
     }
 }
@@ -686,6 +709,7 @@ int main(void)
         return EXIT_FAILURE;
     RUN(gathering_a_constant_gives_the_constant);
     RUN(gathering_tiles_gives_their_mean);
+    RUN(gathering_interpolates_each_tile);
     RUN(gathering_stops_at_a_step_in_depth);
     RUN(ratio_of_a_filtered_pair_stays_between_0_and_1);
     RUN(filter_keeps_a_constant);

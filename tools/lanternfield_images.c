@@ -190,7 +190,7 @@ static const aov_info aovs[] = {
     {"indirect", "aov_indirect", 3, NULL, false},
     {"shadow-u", "shadow_u_filtered|shadow_u|-", 3, NULL, false},
     {"shadow-s", "shadow_s_filtered|shadow_s|-", 3, NULL, false},
-    {"shadow-ratio", "shadow_ratio|-", 3, NULL, false},
+    {"shadow-ratio", "shadow_ratio|shadow_ratio_now|-", 3, NULL, false},
     {"lights-per-pixel", LIGHTS_PER_PIXEL, 1, untile_finish, false},
 };
 
