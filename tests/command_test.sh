@@ -193,7 +193,7 @@ for option in -o --size --camera --eye --target --fov --vpls --bounces --alpha -
   grep -q -- "^  $option " "$work/stdout" || fail "render --help has no $option"
 done
 for default in "default 1280x720" "default 100000" "default 3" "default 1" "default auto" "default AB" "default vpl" \
-  "default restrict" "default ordered" "default exact" "default importance" "default 0.01" "default 8"; do
+  "default restrict" "default ordered" "default exact" "default importance" "default 0.003" "default 8"; do
   grep -qF "($default)" "$work/stdout" || fail "render --help has no \"$default\""
 done
 

