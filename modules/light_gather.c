@@ -11,6 +11,7 @@
 // As in light_gather.glsl.h.
 enum { CELLS = 1 << 16, TABLE = 2 * CELLS, ROW = 1024, SAMPLES_MAX = 8, EMISSIONS = EMISSION_AB + 1 };
 enum { ENTRIES = 1 << 22 };
+enum { GATHER_PIXELS = 2 }; // PIXELS of light_gather.comp.glsl: of a lane
 
 typedef struct gather_counts {
     lgh_dispatch cell_dispatch;
@@ -118,7 +119,7 @@ static void execute_gather(const frame_graph_context *context, void *user)
     const uint32_t n = pass->push.interleave;
     bind(context, pass->pipeline, &pass->push);
     gpu_dispatch(context->commands, div_up_u32(div_up_u32(pass->width, n), 8),
-                 div_up_u32(div_up_u32(pass->height, n), 8), n * n);
+                 div_up_u32(div_up_u32(pass->height, n), 8 * GATHER_PIXELS), n * n);
 }
 
 // ---- Declarations

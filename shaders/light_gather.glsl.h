@@ -102,7 +102,11 @@ struct gather_light {
 
 ivec2 gather_texel(uint light) { return ivec2(3u * (light % GATHER_ROW), light / GATHER_ROW); }
 
-uvec4 gather_pack_position(gather_light g) { return floatBitsToUint(vec4(g.position, g.spread)); }
+// A light that sends nothing is out of reach.
+uvec4 gather_pack_position(gather_light g)
+{
+    return floatBitsToUint(vec4(g.intensity > 0.0 ? g.position : vec3(1e30), g.spread));
+}
 uvec4 gather_pack_color(gather_light g) { return floatBitsToUint(vec4(g.color, g.intensity)); }
 // To 3e-5, from -1 to 1.
 uvec4 gather_pack_moments(gather_light g)
