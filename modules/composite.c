@@ -1,5 +1,6 @@
 // Puts the parts of the light together: radiance, and the direct and indirect parts of it as images of their own.
 #include "modules.h"
+#include "world.h"
 
 #include "lanternfield_renderer_shaders.h"
 
@@ -34,6 +35,14 @@ static void composite_run(const frame_graph_context *context, void *user)
     gpu_dispatch(context->commands, div_up_u32(settings->width, PIXEL_GROUP_WIDTH), settings->height, 1);
 }
 
+static bool has_emission(const renderer *r)
+{
+    for (uint32_t i = 0; i < r->scene->material_count; i++)
+        if (world_material_emits(r, i))
+            return true;
+    return false;
+}
+
 // One pass that makes the image `target` of the given parts; what is left out or absent is read as black, absent ratios
 // as white.
 static void composite_declare(renderer *r, composite_state *state, const char *name, const char *target, uint32_t parts)
@@ -44,7 +53,7 @@ static void composite_declare(renderer *r, composite_state *state, const char *n
     const bool direct = parts & PART_DIRECT, indirect = parts & PART_INDIRECT;
     const char *const uses[] = {
         "albedo",
-        parts & PART_EMISSION ? "emission" : "black",
+        parts & PART_EMISSION && has_emission(r) ? "emission" : "black",
         direct ? "direct|black" : "black",
         direct ? "direct_analytic|direct_u_filtered|direct_u|black" : "black",
         direct ? "direct_ratio|direct_ratio_now|white" : "white",

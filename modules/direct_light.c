@@ -66,7 +66,7 @@ static void direct_light_execute(const frame_graph_context *context, void *user)
     const direct_light_dispatch *d = user;
     frame_graph_bind(context, d->pipeline);
     gpu_push(context->commands, &d->push, sizeof d->push);
-    gpu_dispatch(context->commands, div_up_u32(d->width, 8), div_up_u32(d->height, 8), 1);
+    gpu_dispatch(context->commands, div_up_u32(d->width, PIXEL_GROUP_WIDTH), d->height, 1);
 }
 
 // Adds the pass that makes the rays of the current batch, with the bindings that are the same for both kinds.

@@ -62,14 +62,18 @@ static float hit_alpha(const scene_data *s, const mesh_primitive *p, uint32_t tr
                : alpha * texture_alpha(s, &s->textures[m->base_texture.texture], uv);
 }
 
+// Embree's arrays of N hits each, one behind the other: its accessors are C++.
+enum { HIT_U = 3, HIT_V = 4, HIT_PRIMITIVE = 5 };
+
 static void mask_filter(const struct RTCFilterFunctionNArguments *args)
 {
-    assert(args->N == 1); // rays are traced one at a time
     const masked_primitive *mask = args->geometryUserPtr;
-    const struct RTCHit *hit = (const struct RTCHit *)args->hit;
-    const float alpha = hit_alpha(mask->scene, mask->primitive, hit->primID, hit->u, hit->v);
-    if (!(alpha >= mask->scene->materials[mask->primitive->material].alpha_cutoff))
-        args->valid[0] = 0;
+    const float cutoff = mask->scene->materials[mask->primitive->material].alpha_cutoff;
+    const float *u = (const float *)args->hit + HIT_U * args->N, *v = (const float *)args->hit + HIT_V * args->N;
+    const uint32_t *triangle = (const uint32_t *)args->hit + HIT_PRIMITIVE * args->N;
+    for (uint32_t i = 0; i < args->N; i++)
+        if (args->valid[i] && !(hit_alpha(mask->scene, mask->primitive, triangle[i], u[i], v[i]) >= cutoff))
+            args->valid[i] = 0;
 }
 
 // ---- Scenes
@@ -205,6 +209,59 @@ typedef struct batch {
     ray_hit *hits;
 } batch;
 
+// Neighbouring pixels' rays, those left out skipped. Measured against one ray at a time at 640x360, on the CPU's clock:
+// 0.46 (Atrium) and 0.76 (Sponza) of the time towards a sun, 1.0 and 0.9 towards the VPLs of all pixels. Embree's flag
+// for coherent rays and its streams made the latter 1.2 to 2.8 times slower.
+enum { PACKET = 8 };
+
+typedef struct packet {
+    struct RTCRay8 rays;
+    uint32_t index[PACKET]; // in the batch
+    uint32_t count;
+} packet;
+
+static void packet_add(packet *p, const batch *b, uint32_t i)
+{
+    const uint32_t lane = p->count++;
+    p->rays.org_x[lane] = b->origins[i][0];
+    p->rays.org_y[lane] = b->origins[i][1];
+    p->rays.org_z[lane] = b->origins[i][2];
+    p->rays.tfar[lane] = b->origins[i][3];
+    p->rays.dir_x[lane] = b->directions[i][0];
+    p->rays.dir_y[lane] = b->directions[i][1];
+    p->rays.dir_z[lane] = b->directions[i][2];
+    p->rays.mask[lane] = ~0u;
+    p->index[lane] = i;
+}
+
+// Answers the packet's rays and empties it.
+static void packet_trace(packet *p, const batch *b, struct RTCIntersectContext *context)
+{
+    _Alignas(32) int valid[PACKET];
+    for (uint32_t lane = 0; lane < PACKET; lane++)
+        valid[lane] = lane < p->count ? -1 : 0;
+    rtcOccluded8(valid, b->scene, context, &p->rays);
+    for (uint32_t lane = 0; lane < p->count; lane++)
+        b->visible[p->index[lane]] = p->rays.tfar[lane] > 0; // -inf where something was hit
+    p->count = 0;
+}
+
+static void visible_run(uint32_t begin, uint32_t end, void *user)
+{
+    const batch *b = user;
+    struct RTCIntersectContext context;
+    rtcInitIntersectContext(&context);
+    packet p = {0};
+    for (uint32_t i = begin; i < end; i++) {
+        if (!(b->origins[i][3] > 0))
+            continue;
+        packet_add(&p, b, i);
+        if (p.count == PACKET)
+            packet_trace(&p, b, &context);
+    }
+    packet_trace(&p, b, &context);
+}
+
 static struct RTCRay ray_of(const batch *b, uint32_t i)
 {
     return (struct RTCRay){
@@ -217,21 +274,6 @@ static struct RTCRay ray_of(const batch *b, uint32_t i)
         .dir_z = b->directions[i][2],
         .mask = ~0u,
     };
-}
-
-// One ray at a time: packets of 8 and 16 and streams of incoherent rays were no faster (0.8 to 1.1 times).
-static void visible_run(uint32_t begin, uint32_t end, void *user)
-{
-    const batch *b = user;
-    struct RTCIntersectContext context;
-    rtcInitIntersectContext(&context);
-    for (uint32_t i = begin; i < end; i++) {
-        struct RTCRay ray = ray_of(b, i);
-        if (!(ray.tfar > 0))
-            continue;
-        rtcOccluded1(b->scene, &context, &ray);
-        b->visible[i] = ray.tfar > 0; // -inf where something was hit
-    }
 }
 
 static void nearest_run(uint32_t begin, uint32_t end, void *user)

@@ -51,7 +51,7 @@ static void execute(const frame_graph_context *context, void *user)
     const shadow_pass *pass = user;
     frame_graph_bind(context, pass->pipeline);
     gpu_push(context->commands, &pass->push, sizeof pass->push);
-    gpu_dispatch(context->commands, div_up_u32(pass->width, 8), div_up_u32(pass->height, 8), 1);
+    gpu_dispatch(context->commands, div_up_u32(pass->width, PIXEL_GROUP_WIDTH), pass->height, 1);
 }
 
 // ---- The budget

@@ -7,7 +7,7 @@
 #include "light_rays.glsl.h"
 #include "direct_light.glsl.h"
 
-layout(local_size_x = 8, local_size_y = 8) in;
+layout(local_size_x = PIXEL_GROUP_WIDTH) in;
 layout(set = 0, binding = 0) uniform sampler2D depth_map;
 layout(set = 0, binding = 1) uniform sampler2D normal_map;
 layout(push_constant, scalar) uniform push_block { uint first, layers; } push; // lights of this batch

@@ -9,7 +9,7 @@
 #include "direct_light.glsl.h"
 #include "emitters.glsl.h"
 
-layout(local_size_x = 8, local_size_y = 8) in;
+layout(local_size_x = PIXEL_GROUP_WIDTH) in;
 layout(set = 0, binding = 0) uniform sampler2D depth_map;
 layout(set = 0, binding = 1) uniform sampler2D normal_map;
 layout(set = 0, binding = 6, rgba32f) uniform image2D direct_u;

@@ -3,7 +3,7 @@
 #extension GL_GOOGLE_include_directive : require
 #include "scene.glsl.h"
 
-layout(local_size_x = 8, local_size_y = 8) in;
+layout(local_size_x = PIXEL_GROUP_WIDTH) in;
 layout(set = 0, binding = 0, scalar) readonly buffer estimates_block { vec3 estimates[]; };
 layout(set = 0, binding = 1, scalar) readonly buffer visible_block { uint visible[]; };
 layout(set = 0, binding = 2, rgba32f) uniform image2D sum_map;

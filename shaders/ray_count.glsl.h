@@ -4,20 +4,16 @@
 #define RAY_COUNT_GLSL_H
 
 #extension GL_EXT_scalar_block_layout : require
+#extension GL_KHR_shader_subgroup_arithmetic : require
 
 layout(set = 0, binding = RAYS_BINDING, scalar) buffer rays_block { uint rays_traced; };
 
-shared uint group_rays;
-
+// Without a barrier, which on a CPU device would stop and go on with every subgroup of the workgroup.
 void ray_count(uint rays)
 {
-    if (gl_LocalInvocationIndex == 0u)
-        group_rays = 0u;
-    barrier();
-    atomicAdd(group_rays, rays);
-    barrier();
-    if (gl_LocalInvocationIndex == 0u)
-        atomicAdd(rays_traced, group_rays);
+    uint sum = subgroupAdd(rays);
+    if (subgroupElect())
+        atomicAdd(rays_traced, sum);
 }
 
 #endif

@@ -15,7 +15,7 @@
 #include "reservoir.glsl.h"
 #include "shadow_budget.glsl.h"
 
-layout(local_size_x = 8, local_size_y = 8) in;
+layout(local_size_x = PIXEL_GROUP_WIDTH) in;
 layout(set = 0, binding = 1, scalar) readonly buffer header_block { lgh_header header; };
 layout(set = 0, binding = 2, scalar) readonly buffer grid_lights_block { grid_light grid_lights[]; };
 layout(set = 0, binding = 3, scalar) readonly buffer vpls_block { vpl vpls[]; };
