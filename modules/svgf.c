@@ -1,6 +1,6 @@
 // Spatiotemporal variance-guided filter (Schied et al. 2017) for pairs of an unshadowed and a shadowed estimate, U and
-// S: accumulation over time by reprojection, then five a-trous iterations. U and S are filtered with identical weights,
-// so that S / U stays in [0,1].
+// S: accumulation over time by reprojection, then six or seven a-trous iterations. U and S are filtered with identical
+// weights, so that S / U stays in [0,1].
 #include "direct_light.h"
 #include "filters.h"
 #include "modules.h"
@@ -9,7 +9,7 @@
 
 #include <stdio.h>
 
-enum { ITERATIONS = 5 };
+enum { STEP_MAX = 16, DESCENDING = 5 }; // pixels; iterations from STEP_MAX down to 1
 
 // How far U may differ, relatively and noise aside, between pixels that are averaged: by half, so that a bright spot
 // next by does not decide a dim pixel's ratio; little where the filtered U is what one sees.
@@ -19,7 +19,7 @@ typedef struct svgf_dispatch {
     gpu_pipeline pipeline;
     uint32_t width, height;
     char history[32]; // temporal: what the last frame must have left
-    uint32_t light_shown; // temporal: the pair's U is seen, not only its ratio
+    uint32_t light_shown; // temporal, variance: the pair's U is seen, not only its ratio
     uint32_t interleave; // a-trous
     struct {
         int32_t step;
@@ -51,6 +51,14 @@ static void temporal_execute(const frame_graph_context *context, void *user)
     };
     frame_graph_bind(context, d->pipeline);
     gpu_push(context->commands, &push, sizeof push);
+    image_dispatch(context, d);
+}
+
+static void variance_execute(const frame_graph_context *context, void *user)
+{
+    const svgf_dispatch *d = user;
+    frame_graph_bind(context, d->pipeline);
+    gpu_push(context->commands, &d->light_shown, sizeof d->light_shown);
     image_dispatch(context, d);
 }
 
@@ -128,13 +136,31 @@ static void temporal_declare(const svgf *state, frame_graph *graph, svgf_dispatc
 static void variance_declare(const svgf *state, frame_graph *graph, svgf_dispatch dispatch, const char *pair)
 {
     dispatch.pipeline = state->variance;
-    frame_graph_pass *pass = svgf_pass_add(graph, named("svgf/variance_", pair).text, &dispatch, plain_execute);
+    frame_graph_pass *pass = svgf_pass_add(graph, named("svgf/variance_", pair).text, &dispatch, variance_execute);
     frame_graph_read(pass, "filter_geometry", ACCESS_STORAGE_READ);
     frame_graph_read(pass, "normals", ACCESS_SAMPLED);
     frame_graph_read(pass, named(pair, "_moments").text, ACCESS_STORAGE_READ);
     frame_graph_read(pass, named(pair, "_pair").text, ACCESS_STORAGE_READ);
     image_create(pass, pair, "_pair0", VK_FORMAT_R32G32B32A32_UINT, &dispatch);
     image_create(pass, pair, "_means", VK_FORMAT_R32G32_SFLOAT, &dispatch);
+}
+
+// Iterations before the descending ones: the steps below the interleaving's n, and step 1 in any case, so that no
+// single sample is spread over a lattice.
+static int fine_iterations(const svgf_dispatch *d)
+{
+    int fine = 1;
+    while (1u << fine < d->interleave)
+        fine++;
+    return fine;
+}
+
+// After the fine steps the coarsest, then down to 1: each step fills the gaps that the one before left. Ascending, the
+// last steps' lattices stay, which are seen as a crosshatch with the 3x3 kernel.
+static int32_t step_of(const svgf_dispatch *d, int iteration)
+{
+    const int fine = fine_iterations(d);
+    return iteration < fine ? 1 << iteration : STEP_MAX >> (iteration - fine);
 }
 
 // `suffix` completes the pass's name. What it makes is left to the caller.
@@ -144,7 +170,7 @@ static frame_graph_pass *atrous_declare(frame_graph *graph, svgf_dispatch dispat
     char name[64], from[64];
     snprintf(name, sizeof name, "svgf/atrous_%s_%d%s", pair, iteration, suffix);
     snprintf(from, sizeof from, "%s_pair%d", pair, iteration);
-    dispatch.atrous.step = 1 << iteration;
+    dispatch.atrous.step = step_of(&dispatch, iteration);
     // The tiles of interleaving sample different lights, which neither is noise nor may be seen: the kernels of the
     // steps below n, unstopped by values, cancel all that repeats every n pixels.
     dispatch.atrous.any_value = 1u << iteration < dispatch.interleave;
@@ -159,16 +185,17 @@ static frame_graph_pass *atrous_declare(frame_graph *graph, svgf_dispatch dispat
 static void iterations_declare(const svgf *state, frame_graph *graph, svgf_dispatch dispatch, const char *pair)
 {
     dispatch.pipeline = state->atrous;
-    for (int i = 0; i < ITERATIONS - 1; i++) {
+    const int last_iteration = fine_iterations(&dispatch) + DESCENDING - 1;
+    for (int i = 0; i < last_iteration; i++) {
         char to[16];
         snprintf(to, sizeof to, "_pair%d", i + 1);
         image_create(atrous_declare(graph, dispatch, pair, i, ""), pair, to, VK_FORMAT_R32G32B32A32_UINT, &dispatch);
     }
     dispatch.pipeline = state->atrous_ratio;
-    frame_graph_pass *ratio = atrous_declare(graph, dispatch, pair, ITERATIONS - 1, "");
+    frame_graph_pass *ratio = atrous_declare(graph, dispatch, pair, last_iteration, "");
     image_create(ratio, pair, "_ratio_now", VK_FORMAT_R16G16B16A16_SFLOAT, &dispatch);
     dispatch.pipeline = state->atrous_last;
-    frame_graph_pass *last = atrous_declare(graph, dispatch, pair, ITERATIONS - 1, "_pair");
+    frame_graph_pass *last = atrous_declare(graph, dispatch, pair, last_iteration, "_pair");
     image_create(last, pair, "_u_filtered", VK_FORMAT_R32G32B32A32_SFLOAT, &dispatch);
     image_create(last, pair, "_s_filtered", VK_FORMAT_R32G32B32A32_SFLOAT, &dispatch);
 }

@@ -1,5 +1,5 @@
 // Smooths the variances in the pair's alpha channels, which are noisy themselves, over the pixels around, and writes the
-// mean luminances of the pair around, which the next frame compares with its own.
+// mean luminances of the pair around, which the next frame compares with its own. Takes the weight of isolated spikes.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "svgf.glsl.h"
@@ -11,10 +11,12 @@ layout(set = 0, binding = 2, rgba32f) uniform readonly image2D moments_map;
 layout(set = 0, binding = 3, rgba32ui) uniform readonly uimage2D pair_map;
 layout(set = 0, binding = 4, rgba32ui) uniform writeonly uimage2D out_pair;
 layout(set = 0, binding = 5, rg32f) uniform writeonly image2D out_means;
+layout(push_constant, scalar) uniform push_block { uint light_shown; } push; // 1: U is shown, not only the ratio
 
 struct smoothed {
     vec2 means;    // luminances of U and S around
     vec2 variance; // of U, and of the ratio
+    float brightest_neighbour; // of U, on the same surface; 0: none
 };
 
 smoothed smooth_around(ivec2 pixel, filter_center center, uvec4 pair)
@@ -23,7 +25,8 @@ smoothed smooth_around(ivec2 pixel, filter_center center, uvec4 pair)
     // In the first frames each pixel's variance comes from the 3x3 pixels around: what is three pixels away has its own.
     bool settled = imageLoad(moments_map, pixel).w >= SVGF_TEMPORAL_FRAMES;
     int stride = settled ? 1 : 3;
-    float weights = 0.0, lowest = 1.0, highest = 0.0; // ratio around
+    float weights = 0.0, brightest_neighbour = 0.0;
+    float lowest = 1.0, highest = 0.0; // ratio around
     vec2 means = vec2(0.0), variance = vec2(0.0);
     for (int y = -stride; y <= stride; y += stride)
         for (int x = -stride; x <= stride; x += stride) {
@@ -38,16 +41,25 @@ smoothed smooth_around(ivec2 pixel, filter_center center, uvec4 pair)
             means += weight * vec2(u, s);
             variance += weight * vec2(unshadowed.a, shadowed.a);
             if ((x != 0 || y != 0) && weight > 0.5 && u > 0.0) {
+                brightest_neighbour = max(brightest_neighbour, u);
                 lowest = min(lowest, s / u);
                 highest = max(highest, s / u);
             }
         }
-    smoothed result = smoothed(means / weights, variance / weights); // the pixel itself weighs about 1
+    smoothed result = smoothed(means / weights, variance / weights, brightest_neighbour); // the pixel weighs about 1
     // A ratio beyond all those around is an error of its own (a ray that slips through a corner in every frame).
     float r = shadow_ratio_luminance(pair_unshadowed(pair).rgb, pair_shadowed(pair).rgb);
     float beyond = settled && lowest <= highest ? max(max(r - highest, lowest - r), 0.0) : 0.0;
     result.variance.y += beyond * beyond;
     return result;
+}
+
+// A pixel with more light than all around would decide the ratio of what it is averaged with, and stay as a dark dot
+// where it is occluded. Scaling U and S alike leaves its ratio. What the history holds is not touched.
+float spike_scale(float light, float brightest_neighbour)
+{
+    bool spike = push.light_shown == 0u && brightest_neighbour > 0.0 && light > brightest_neighbour;
+    return spike ? brightest_neighbour / light : 1.0;
 }
 
 void main()
@@ -62,8 +74,9 @@ void main()
         vec3 geometric = octahedral_decode(texelFetch(normal_map, pixel, 0).xy);
         pair = imageLoad(pair_map, pixel);
         smoothed around = smooth_around(pixel, filter_center_of(pixel, geometry, geometric), pair);
-        pair = pair_pack(vec4(pair_unshadowed(pair).rgb, around.variance.x),
-                         vec4(pair_shadowed(pair).rgb, around.variance.y));
+        vec3 unshadowed = pair_unshadowed(pair).rgb, shadowed = pair_shadowed(pair).rgb;
+        float scale = spike_scale(luminance(unshadowed), around.brightest_neighbour);
+        pair = pair_pack(vec4(scale * unshadowed, around.variance.x), vec4(scale * shadowed, around.variance.y));
         means = around.means;
     }
     imageStore(out_pair, pixel, pair);
