@@ -9,15 +9,15 @@ enum {
     TIME_TRANSIENT = 2, // frames after a change that allocate, compile and rebuild
     TIME_FRAMES = 4, // then measured, before a time is believed, and between looks at it
     ERROR_TRANSIENT = 8, // frames after a change until the filter's history is of the new settings
-    ERROR_FRAMES_MIN = 6, // then measured at least, before an error is believed
-    ERROR_FRAMES_MAX = 32, // and at most
+    ERROR_FRAMES_MIN = 8, // then measured at least, before an error is believed: bright spots are rare
+    ERROR_FRAMES_MAX = 40, // and at most
     SETTLED_AGE = 16, // frames: as long as the filter's history
     PATIENT_CHANGES = 3, // each later one waits twice as long
 };
 
 // What a change must gain, and how far off the target calls for one.
 static const double ms_high = 1.07, ms_low = 0.93, ms_aim = 0.98; // of target_ms
-static const double error_high = 1.1, error_low = 1 / 1.25, error_aim = 0.97; // of target_error
+static const double error_high = 1.12, error_low = 1 / 1.15, error_aim = 0.98; // of target_error
 static const double gain_needed = 0.9; // of the error, for a change while the time is met
 static const double view_changed = 1.5; // off by so much after it was met: another view, start anew
 static const double error_floor = 0.02; // a scene needs no less
@@ -94,7 +94,8 @@ static double model_error(const render_settings *s, automatic_part part)
     const double alpha = (double)s->alpha;
     switch (part) {
     case AUTOMATIC_HIERARCHY:
-        return 0.01 / (alpha * alpha * sqrt(alpha)) * (1 + 0.1 * (s->interleave - 1));
+        // In small pictures 4x4 tiles, filtered across edges, take several times the error of none.
+        return 0.01 / (alpha * alpha * sqrt(alpha)) * (1 + 0.15 * (s->interleave * s->interleave - 1));
     case AUTOMATIC_SHADOW_RATIO:
         return 0.01 * (0.6 + 0.4 / rays_of(s)); // most is bias, of which no ray takes any
     case AUTOMATIC_VPL_SET:
@@ -178,8 +179,19 @@ double automatic_milliseconds(const automatic *a)
     return median(sums, length);
 }
 
+// Where nothing moves, VPLs are traced and built after changes only, and the median frame tells nothing of it.
+static void vpl_time_add(automatic *a, double milliseconds)
+{
+    const double model = model_milliseconds(&a->current, AUTOMATIC_VPLS), scale = milliseconds / model;
+    if (a->age == 1)
+        a->vpl_scale = scale;
+    else if (scale > 0.2 * a->vpl_scale) // they were traced again, without what the first time takes
+        a->vpl_scale = fmin(a->vpl_scale, scale);
+}
+
 static void times_add(automatic *a, const automatic_frame *frame)
 {
+    vpl_time_add(a, frame->milliseconds[AUTOMATIC_VPLS]);
     if (a->age <= TIME_TRANSIENT)
         return;
     for (automatic_group group = 0; group < AUTOMATIC_GROUPS; group++)
@@ -269,6 +281,13 @@ static double predict_score(const automatic *a, const render_settings *s)
     return fmax(error_floor, automatic_predict_error(a, s));
 }
 
+// A frame in which all VPLs are traced and built stays near the target, so that a light that moves after a while does
+// not stall a still picture for seconds. A thousand never do.
+static bool traces_in_time(const automatic *a, const render_settings *s)
+{
+    return s->vpls <= 1000 || a->vpl_scale * model_milliseconds(s, AUTOMATIC_VPLS) <= a->target_ms;
+}
+
 // What the fastest choice takes.
 static double milliseconds_least(const automatic *a)
 {
@@ -288,7 +307,7 @@ static bool plan_within(const automatic *a, double most, render_settings *best)
     for (uint32_t i = 0; i < CHOICES; i++) {
         const render_settings s = choice_of(&a->current, i);
         double score = predict_score(a, &s);
-        if (score > best_score || automatic_predict_milliseconds(a, &s) > most)
+        if (score > best_score || !traces_in_time(a, &s) || automatic_predict_milliseconds(a, &s) > most)
             continue;
         score *= 1 + 1e-3 * log(model_cost(&s));
         if (score < best_score) {
@@ -330,14 +349,14 @@ static bool is_candidate(const automatic *a, const render_settings *s)
     return true;
 }
 
-// The cheapest settings that were enough; NULL where none were.
-static const render_settings *cheapest_enough(const automatic *a)
+// The cheapest trial that was enough; NULL where none was.
+static const automatic_trial *cheapest_enough(const automatic *a)
 {
-    const render_settings *best = NULL;
+    const automatic_trial *best = NULL;
     for (uint32_t i = 0; i < a->trial_count; i++) {
         const automatic_trial *trial = &a->trials[i];
-        if (trial->enough && (!best || model_cost(&trial->settings) < model_cost(best)))
-            best = &trial->settings;
+        if (trial->enough && (!best || model_cost(&trial->settings) < model_cost(&best->settings)))
+            best = trial;
     }
     return best;
 }
@@ -345,8 +364,8 @@ static const render_settings *cheapest_enough(const automatic *a)
 // The cheapest candidate that reaches the error. Where there is none, what was enough, or else the least error.
 static render_settings plan_for_error(const automatic *a)
 {
-    const render_settings *enough = cheapest_enough(a);
-    render_settings best = enough ? *enough : a->current;
+    const automatic_trial *enough = cheapest_enough(a);
+    render_settings best = enough ? enough->settings : a->current;
     double best_score = INFINITY;
     for (uint32_t i = 0; i < CHOICES && a->trial_count < AUTOMATIC_TRIALS; i++) {
         const render_settings s = choice_of(&a->current, i);
@@ -441,14 +460,15 @@ static bool step_for_time(automatic *a)
     return true;
 }
 
-// Whether the error measured with the current settings is known well enough to judge them.
+// Whether the error measured with the current settings is known well enough to judge them: as precisely as errors
+// differ that are met and not met, or surely too high or too low.
 static bool error_is_known(const automatic *a, double error, double standard_error)
 {
     if (a->age >= ERROR_TRANSIENT + ERROR_FRAMES_MAX)
         return true;
     return a->age >= ERROR_TRANSIENT + ERROR_FRAMES_MIN &&
-           (standard_error < 0.05 * error || error - 3 * standard_error > error_high * a->target_error ||
-            error + 3 * standard_error < error_low * a->target_error);
+           (standard_error < 0.05 * error || error - 2.5 * standard_error > error_high * a->target_error ||
+            error + 2.5 * standard_error < error_low * a->target_error);
 }
 
 static bool step_for_error(automatic *a)
@@ -461,16 +481,19 @@ static bool step_for_error(automatic *a)
         return false;
     const bool high = error > error_high * target, low = error < error_low * target;
     if (a->trial_count < AUTOMATIC_TRIALS)
-        a->trials[a->trial_count++] = (automatic_trial){a->current, !high};
+        a->trials[a->trial_count++] = (automatic_trial){a->current, a->probes, !high};
     const render_settings next = plan_for_error(a);
     a->settled = (!high && !low) || choices_equal(&next, &a->current);
     if (a->settled)
         return false;
-    a->returned = cheapest_enough(a) && choices_equal(&next, cheapest_enough(a));
+    const automatic_trial *enough = cheapest_enough(a);
+    a->returned = enough && choices_equal(&next, &enough->settings);
     char why[96];
     snprintf(why, sizeof why, "an error of %.3f +- %.3f is %s than %g", error, standard_error, high ? "more" : "less",
              target);
     change(a, &next, why);
+    if (a->returned)
+        a->probes = enough->probes; // what is known of these settings already
     return true;
 }
 

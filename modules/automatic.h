@@ -13,7 +13,7 @@
 //
 //   hierarchy   grid lights in place of VPLs: (L - U)^2, L the hierarchy's unshadowed sum, U that over all VPLs
 //   shadows     the rest of the picture's distance from the shadowed sum over all VPLs: noise and bias of the ratio
-//   vpls        the VPLs are a sample: a quarter of the squared difference between the sums of two halves
+//   vpls        the VPLs are a sample: part of the squared difference between the sums of two halves (probe.c)
 //
 // The models are crude; their scales are fitted to what is measured with the settings in use, so that a choice made
 // from them is corrected by the next measurement. It changes nothing while the target is met but for a clear gain,
@@ -63,6 +63,7 @@ typedef enum automatic_part {
 enum { AUTOMATIC_TRIALS = 12 };
 typedef struct automatic_trial { // settings that were judged
     render_settings settings;
+    automatic_probes probes; // what they were judged by
     bool enough; // they reach the target error
 } automatic_trial;
 
@@ -75,6 +76,7 @@ typedef struct automatic {
     bool settled; // the target is met, or cannot be met better, and long enough since
     double window[AUTOMATIC_GROUPS][AUTOMATIC_WINDOW]; // ring by age
     double time_scales[AUTOMATIC_GROUPS]; // measured over model; 0: not measured yet
+    double vpl_scale; // of AUTOMATIC_VPLS in frames in which they were traced, after the last change
     double error_sums[AUTOMATIC_PARTS], model_sums[AUTOMATIC_PARTS]; // measured and modelled squares, decaying
     automatic_probes probes; // since the last change and its transient
     automatic_trial trials[AUTOMATIC_TRIALS]; // target_error

@@ -10,7 +10,8 @@
 #include "automatic.h"
 #include "renderer.h"
 
-// Of this frame. So many that their sums over all VPLs take a few per cent of a frame.
+// Of this frame. So many that their sums over all VPLs take a few per cent of a frame; more where an error is asked
+// for.
 uint32_t probe_count(const renderer *r);
 // The probes of the frame that has just finished; empty where there were none. The pointer is valid until the next one.
 const probe *probe_results(renderer *r, uint32_t *count);

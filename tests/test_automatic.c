@@ -146,6 +146,20 @@ TEST(time_is_met_within_20_frames_and_kept)
         }
 }
 
+// VPLs cost nothing where nothing moves, but a frame that traces them again must not stall.
+TEST(still_picture_takes_no_more_vpls_than_one_frame_traces)
+{
+    simulation sim = plain;
+    sim.still = true;
+    sim.vpls = 0.1; // worth as many as there may be
+    run r = run_start(640, 360, 250, 0);
+    run_frames(&r, &sim, 60);
+    double times[AUTOMATIC_GROUPS];
+    true_times(&sim, &r.settings, times);
+    CHECK(times[AUTOMATIC_VPLS] < 250);
+    CHECK(r.settings.vpls >= 88388);
+}
+
 TEST(too_little_time_gives_about_the_fastest_there_is)
 {
     simulation sim = plain;
@@ -319,6 +333,7 @@ TEST(targets_are_refused_where_there_is_nothing_to_choose)
 int main(void)
 {
     RUN(time_is_met_within_20_frames_and_kept);
+    RUN(still_picture_takes_no_more_vpls_than_one_frame_traces);
     RUN(too_little_time_gives_about_the_fastest_there_is);
     RUN(more_time_gives_less_error);
     RUN(a_step_of_cost_is_followed);
