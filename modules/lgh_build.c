@@ -14,6 +14,7 @@
 
 #include "lanternfield_renderer_shaders.h"
 
+#include <float.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -82,6 +83,7 @@ typedef struct lgh_build {
     uint32_t built_frame; // ... and which it was
     bool is_built;
     vpl_change (*change)(const renderer *r);
+    const frame_constants *scene; // its bounds
     // Of the current frame:
     lgh_signature now;
     uint32_t frame;
@@ -142,12 +144,28 @@ static uint32_t stretches_of(const lgh_build *b)
 }
 
 typedef struct grid_push {
-    uint32_t partial_count, exponent, stage, history, changed, world;
+    uint32_t partial_count, exponent, stage, history, changed, kept, snapped;
+    float scene_low[3], scene_high[3];
 } grid_push;
 
 static grid_push grid_push_of(const lgh_build *b, uint32_t stage)
 {
-    return (grid_push){stretches_of(b), b->now.exponent, stage, b->history, b->changed, b->now.grid == GRID_WORLD};
+    grid_push push = {
+        .partial_count = stretches_of(b),
+        .exponent = b->now.exponent,
+        .stage = stage,
+        .history = b->history,
+        .changed = b->changed,
+        .kept = b->now.grid != GRID_BOUNDS,
+        .snapped = b->now.grid == GRID_WORLD,
+        .scene_low = {FLT_MAX, FLT_MAX, FLT_MAX},
+        .scene_high = {-FLT_MAX, -FLT_MAX, -FLT_MAX},
+    };
+    if (b->now.grid == GRID_SCENE) {
+        memcpy(push.scene_low, b->scene->scene_min, sizeof push.scene_low);
+        memcpy(push.scene_high, b->scene->scene_max, sizeof push.scene_high);
+    }
+    return push;
 }
 
 static void execute_bounds(const frame_graph_context *context, void *user)
@@ -199,7 +217,7 @@ static void count_levels(const frame_graph_context *context, const lgh_build *b,
         uint32_t stage, partial_count, exponent, levels, capacity, interleave, sorted;
         float alpha;
     } levels = {stage,           stretches_of(b),   b->now.exponent, b->now.levels,
-                b->now.capacity, b->now.interleave, b->now.sorted,       b->now.alpha};
+                b->now.capacity, b->now.interleave, b->now.sorted,   b->now.alpha};
     by_state(context, b, CLEAR, &words, 4, STATE_DISPATCH(words[stage]));
     if (stage == 1) {
         const uint32_t keys[] = {b->now.slots, b->now.exponent, 0};
@@ -840,6 +858,7 @@ bool lgh_build_init(renderer *r)
     };
     lgh_build *b = renderer_pass_add(r, "lgh_build", sizeof *b, lgh_build_setup, lgh_build_fini);
     b->change = vpl_trace_change;
+    b->scene = &r->constants;
     for (uint32_t i = 0; i < PIPELINE_COUNT; i++) {
         if (i == SCATTER && !gpu_has_float_atomics(r->gpu))
             continue;

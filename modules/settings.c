@@ -23,7 +23,7 @@ render_settings render_settings_default(void)
         .bounces = 3,
         .alpha = 1,
         .levels = 0,
-        .grid = GRID_WORLD,
+        .grid = GRID_SCENE,
         .lighting = LIGHTING_GATHER,
         .shadow_samples = 1,
         .interleave = 1,
@@ -215,7 +215,8 @@ static const char *const only_names[] = {
     NULL,
 };
 static const char *const lighting_names[] = {[LIGHTING_GATHER] = "gather", [LIGHTING_VOLUMES] = "volumes", NULL};
-static const char *const grid_names[] = {[GRID_WORLD] = "world", [GRID_BOUNDS] = "bounds", NULL};
+static const char *const grid_names[] = {
+    [GRID_SCENE] = "scene", [GRID_WORLD] = "world", [GRID_BOUNDS] = "bounds", NULL};
 static const char *const build_names[] = {
     [LGH_BUILD_RESTRICT] = "restrict",
     [LGH_BUILD_GATHER] = "gather",
@@ -302,7 +303,7 @@ static const setting_info table[] = {
      .type = SETTING_ENUM,
      FIELD(grid),
      .values = grid_names,
-     .help = "the hierarchy's grid: anchored in the world, or around the lights' bounds"},
+     .help = "the hierarchy's grid: around the scene, at powers of two in the world, or around the lights' bounds"},
     {.name = "lighting",
      .type = SETTING_ENUM,
      FIELD(lighting),

@@ -8,7 +8,7 @@ typedef enum render_method { METHOD_LGH, METHOD_PATH, METHOD_VPL, METHOD_IR } re
 typedef enum ray_method { RAYS_AUTO, RAYS_QUERY, RAYS_PIPELINE, RAYS_EMBREE } ray_method;
 typedef enum render_only { ONLY_ALL, ONLY_DIRECT, ONLY_INDIRECT, ONLY_INDIRECT_UNSHADOWED } render_only;
 typedef enum lighting_method { LIGHTING_GATHER, LIGHTING_VOLUMES } lighting_method;
-typedef enum grid_method { GRID_WORLD, GRID_BOUNDS } grid_method;
+typedef enum grid_method { GRID_SCENE, GRID_WORLD, GRID_BOUNDS } grid_method;
 typedef enum lgh_build_method { LGH_BUILD_RESTRICT, LGH_BUILD_GATHER, LGH_BUILD_SCATTER } lgh_build_method;
 typedef enum lgh_s1_method { LGH_S1_ORDERED, LGH_S1_ATOMIC } lgh_s1_method;
 typedef enum end_point { END_POINT_CENTRE, END_POINT_JITTER, END_POINT_VPL } end_point;

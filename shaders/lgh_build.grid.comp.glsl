@@ -1,8 +1,10 @@
 // Bounds of the VPLs, second half: one invocation joins the partials, and keeps last frame's grid or lays a new one.
 //
-// Around the bounds, the top level's cell is their longest edge, a little padded (Lin and Yuksel 2019, section 3.1).
-// Anchored in the world, it is the next power of two and the corner a multiple of it, so that small motions leave the grid
-// alone; it is kept for as long as every VPL lies in it, and the level count with it (see lgh_build.levels.comp.glsl).
+// The top level's cell is the longest edge of the VPLs' bounds, a little padded (Lin and Yuksel 2019, section 3.1); of the
+// scene's, around which VPLs may move as they like; or the next power of two, and the corner a multiple of it. The latter
+// two are kept for as long as every VPL lies in them, and the level count too (see lgh_build.levels.comp.glsl). The
+// scene's outer walls lie on the grid's faces, and have one layer of vertices with light, not two: powers of two
+// have 1.3 to 1.4 times the lights per pixel at equal alpha (measured, atrium and Sponza).
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "lgh_build.state.glsl.h"
@@ -17,7 +19,9 @@ layout(push_constant, scalar) uniform push_block {
     uint stage;
     uint history; // 1: header and state are last frame's
     uint changed; // 1: the partials are of the changed VPLs alone
-    uint world;   // 1: the grid is anchored in the world
+    uint kept;    // 1: a grid is kept while it fits
+    uint snapped; // 1: it lies at powers of two
+    vec3 scene_low, scene_high; // that a grid is laid around, if not empty
 } push;
 
 void lay_grid(vec3 low, vec3 high)
@@ -28,7 +32,7 @@ void lay_grid(vec3 low, vec3 high)
     float pad = 1e-4 * longest + 1e-5 * max(max(reach.x, reach.y), reach.z) + 1e-6;
     header.origin = low - pad;
     header.top_size = longest + 2.0 * pad;
-    if (push.world != 0u) {
+    if (push.snapped != 0u) {
         header.top_size = uintBitsToFloat((floatBitsToUint(header.top_size) + 0x7fffffu) & 0x7f800000u);
         header.origin = floor(header.origin / header.top_size) * header.top_size;
     }
@@ -81,10 +85,10 @@ void main()
     state.listed = all.count;
     state.last_count = changed ? header.vpl_count : 0u;
     uint count = state.last_count - all.removed + all.count;
-    if (push.stage == 1u || (push.world == 0u && !changed)) {
+    if (push.stage == 1u || (push.kept == 0u && !changed)) {
         if (count == 0u)
             all.low = all.high = vec3(0.0);
-        lay_grid(all.low, all.high);
+        lay_grid(min(all.low, push.scene_low), max(all.high, push.scene_high));
     }
     if (push.stage == 0u)
         state.fresh = push.history == 0u || header.level_count == 0u || count == 0u ||

@@ -129,6 +129,8 @@ TEST(a_small_motion_far_away_leaves_still_pixels_alone)
     CHECK(motion_of(METHOD_IR, GRID_WORLD, &worst).change < 1e-4); // what the light itself does
     const motion bounds = motion_of(METHOD_LGH, GRID_BOUNDS, &worst);
     CHECK(bounds.change > 0.005 && bounds.share > 0.2); // the test can tell
+    motion_of(METHOD_LGH, GRID_SCENE, &worst);
+    CHECK(worst.change < 0.005 && worst.share == 0);
     motion_of(METHOD_LGH, GRID_WORLD, &worst);
     CHECK(worst.change < 0.005 && worst.share == 0);
 }

@@ -40,7 +40,7 @@ TEST(defaults_are_the_documented_ones)
     CHECK(settings.vpls == 100000 && settings.bounces == 3 && settings.alpha == 1 && settings.levels == 0);
     CHECK(settings.shadow_samples == 1 && settings.interleave == 1 && settings.emission == EMISSION_AB);
     CHECK(settings.end_point == END_POINT_VPL && settings.build == LGH_BUILD_RESTRICT && settings.s1 == LGH_S1_ORDERED);
-    CHECK(settings.lighting == LIGHTING_GATHER && settings.grid == GRID_WORLD);
+    CHECK(settings.lighting == LIGHTING_GATHER && settings.grid == GRID_SCENE);
     CHECK(settings.reservoirs == RESERVOIRS_EXACT && settings.sampling == SAMPLING_IMPORTANCE);
     CHECK(settings.start_level == 0 && settings.sample_s1 && settings.filter && settings.taa);
     CHECK_NEAR(settings.singularity, 0.003, 1e-9);
