@@ -391,6 +391,8 @@ TEST(a_small_motion_leaves_the_grid_where_it_is)
 TEST(the_world_grid_is_a_power_of_two_at_a_multiple_of_itself)
 {
     fixture f = given_fixture(3000);
+    f.r->settings.grid = GRID_WORLD;
+    render(&f, VPLS_ALL);
     hierarchy h = hierarchy_read(f.r);
     const lgh_header *header = header_of(&h);
     int exponent;
