@@ -152,6 +152,7 @@ static void declare_pack(renderer *r, light_gather *state, gather_pass pass)
     frame_graph_read(p, "lgh_header", ACCESS_STORAGE_READ);
     frame_graph_read(p, "lgh_lights", ACCESS_STORAGE_READ);
     frame_graph_read(p, "vpls", ACCESS_STORAGE_READ);
+    frame_graph_read(p, "lgh_order", ACCESS_STORAGE_READ);
     frame_graph_create_resource(p, "gather_lights", &image, ACCESS_STORAGE_WRITE);
     frame_graph_read(p, "lgh_header", ACCESS_INDIRECT);
 }

@@ -60,13 +60,13 @@ void pixel_start(uint j, uint key)
 
 // A reservoir takes light i with probability f_i / (f_1 + ... + f_i). All share a random number a light, shifted by equal
 // steps: which keeps them apart. Lights without weight draw none, so that more candidates change nothing.
-void reservoirs_offer(uint j, uint light, float f)
+void reservoirs_offer(uint j, uint name, float f)
 {
     pixels[j].light.a += f;
     pixels[j].random = f > 0.0 ? pixels[j].random * 747796405u + 2891336453u : pixels[j].random;
     [[unroll]] for (uint s = 0u; s < SAMPLES; s++) {
         float u = float(pixels[j].random + s * (0xffffffffu / SAMPLES) >> 8) * (1.0 / 16777216.0);
-        pixels[j].chosen[s] = u * pixels[j].light.a < f ? light : pixels[j].chosen[s];
+        pixels[j].chosen[s] = u * pixels[j].light.a < f ? name : pixels[j].chosen[s];
     }
 }
 
@@ -142,12 +142,12 @@ bool may_light(vec3 position, gather_level level)
 gather_light shuffled(gather_light g, uint lane)
 {
     return gather_light(subgroupShuffle(g.position, lane), subgroupShuffle(g.spread, lane),
-                        subgroupShuffle(g.color, lane), subgroupShuffle(g.intensity, lane),
+                        subgroupShuffle(g.color, lane), subgroupShuffle(g.name, lane),
                         subgroupShuffle(g.normal, lane), subgroupShuffle(g.diagonal, lane),
                         subgroupShuffle(g.mixed, lane));
 }
 
-void add_light(uint j, gather_level level, gather_light g, uint light, bool mine, bool offered)
+void add_light(uint j, gather_level level, gather_light g, bool mine, bool offered)
 {
     vec3 v;
     gbuffer_point point = pixels[j].point;
@@ -156,25 +156,25 @@ void add_light(uint j, gather_level level, gather_light g, uint light, bool mine
     float blend = mine ? lgh_blend(level.kind, d * level.inverse_radius, 1.0) : 0.0;
     grid_light moments = grid_light(vec3(0.0), 0.0, vec3(0.0), 0u, vec3(0.0), g.normal, g.diagonal, g.mixed);
     float emitted = level.vpls ? max(0.0, dot(g.normal, v)) : grid_emission(EMISSION, moments, v);
-    float sent = blend * received * emitted * level.factor;
-    pixels[j].light.rgb += sent * g.color;
+    vec3 light = g.color * (blend * received * emitted * level.factor);
+    pixels[j].light.rgb += light;
     if (COUNT)
         pixels[j].count += blend > 0.0 ? 1.0 : 0.0;
     if (SAMPLES == 0u)
         return;
-    float f = offered ? sent * g.intensity : 0.0;
-    reservoirs_offer(j, light, UNIFORM && f > 0.0 ? 1.0 : f);
+    float f = offered ? luminance(light) : 0.0;
+    reservoirs_offer(j, g.name, UNIFORM && f > 0.0 ? 1.0 : f);
 }
 
 // ---- Lists
 
-// The i-th of all lights of a level that a tile knows. GATHER_NONE: the level's last row of tiles is not full.
+// The i-th of a level's lights as a tile knows them. GATHER_NONE: it is another tile's, or there is none.
 uint level_light(gather_level level, uint i, uint tile)
 {
     uint tiles = push.interleave * push.interleave;
     if (level.vpls) {
-        uint slot = i * tiles + (tile + tiles - i % tiles) % tiles;
-        return slot < push.slot_count ? push.grid_capacity + slot : GATHER_NONE;
+        uint light = push.grid_capacity + i, name = imageLoad(packed_lights, gather_texel(light) + ivec2(1, 0)).w;
+        return gather_slot_tile(name & ~RESERVOIR_VPL, tiles) == tile ? light : GATHER_NONE;
     }
     uint number = level.factor > 1.0 ? i * tiles + tile : i;
     return number < header.levels[level.c].occupied ? header.levels[level.c].first_light + number : GATHER_NONE;
@@ -183,8 +183,8 @@ uint level_light(gather_level level, uint i, uint tile)
 // All that level_light can give. `first` is GATHER_NONE.
 gather_range level_range(gather_level level)
 {
-    uint count = level.vpls ? push.slot_count : header.levels[level.c].occupied;
-    uint step = uint(level.factor);
+    uint count = level.vpls ? header.vpl_count : header.levels[level.c].occupied;
+    uint step = level.vpls ? 1u : uint(level.factor);
     return gather_range(GATHER_NONE, (count + step - 1u) / step);
 }
 
@@ -234,9 +234,8 @@ void walk_range(gather_level level, gather_range range, uint tile, bool mine[PIX
             for (uint bits = passed[word]; bits != 0u; bits &= bits - 1u) {
                 uint from = word * 32u + uint(findLSB(bits));
                 gather_light one = shuffled(g, from);
-                uint name = subgroupShuffle(light, from);
                 [[unroll]] for (uint j = 0u; j < PIXELS; j++)
-                    add_light(j, level, one, name, mine[j], offered[j]);
+                    add_light(j, level, one, mine[j], offered[j]);
             }
     }
 }

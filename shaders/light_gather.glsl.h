@@ -39,7 +39,7 @@ layout(push_constant, scalar) uniform push_block {
     uint start_level;
     uint coarser;        // a list cell has 2^coarser cells of its level along an edge; at least 1
     uint entry_capacity;
-    uint grid_capacity;  // packed VPLs lie behind as many packed grid lights
+    uint grid_capacity;  // packed VPLs lie behind as many packed grid lights, in the order of `lgh_order`
     uint slot_count;     // VPL slots
     uint late_s1;        // 1: S1 and S0 are offered only where no other light was
     float alpha;
@@ -95,19 +95,15 @@ struct gather_light {
     vec3 position;
     float spread;    // grid_spread
     vec3 color;
-    float intensity; // luminance of `color`
+    uint name; // in reservoirs
     vec3 normal;
     vec3 diagonal, mixed; // second moments of the normals; their diagonal sums to 1
 };
 
 ivec2 gather_texel(uint light) { return ivec2(3u * (light % GATHER_ROW), light / GATHER_ROW); }
 
-// A light that sends nothing is out of reach.
-uvec4 gather_pack_position(gather_light g)
-{
-    return floatBitsToUint(vec4(g.intensity > 0.0 ? g.position : vec3(1e30), g.spread));
-}
-uvec4 gather_pack_color(gather_light g) { return floatBitsToUint(vec4(g.color, g.intensity)); }
+uvec4 gather_pack_position(gather_light g) { return floatBitsToUint(vec4(g.position, g.spread)); }
+uvec4 gather_pack_color(gather_light g) { return uvec4(floatBitsToUint(g.color), g.name); }
 // To 3e-5, from -1 to 1.
 uvec4 gather_pack_moments(gather_light g)
 {
@@ -117,9 +113,9 @@ uvec4 gather_pack_moments(gather_light g)
 
 gather_light gather_unpack(uvec4 position, uvec4 color, uvec4 moments)
 {
-    vec4 p = uintBitsToFloat(position), c = uintBitsToFloat(color);
+    vec4 p = uintBitsToFloat(position);
     vec2 a = unpackSnorm2x16(moments.x), b = unpackSnorm2x16(moments.y), d = unpackSnorm2x16(moments.z);
-    return gather_light(p.xyz, p.w, c.rgb, c.a, vec3(a, b.x), vec3(b.y, d.x, 1.0 - b.y - d.x),
+    return gather_light(p.xyz, p.w, uintBitsToFloat(color.rgb), color.a, vec3(a, b.x), vec3(b.y, d.x, 1.0 - b.y - d.x),
                         vec3(d.y, unpackSnorm2x16(moments.w)));
 }
 

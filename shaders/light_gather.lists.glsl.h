@@ -32,8 +32,17 @@ struct list_cell {
     bool fill;          // else count
 };
 
+// Of the cell's only list, where it has one: counted here, and not in memory.
+gather_range only;
+
 void take(list_cell l, uint light, uint tile)
 {
+    if (l.tiles == 1u) {
+        if (l.fill)
+            entries[only.first + only.count] = light;
+        only.count++;
+        return;
+    }
     uint place = l.first_range + tile, count = ranges[place].count;
     if (l.fill)
         entries[ranges[place].first + count] = light;
@@ -90,14 +99,15 @@ void walk_vpls(list_cell l)
             for (int x = low.x; x <= high.x; x++) {
                 uvec2 range = cell_range(ivec3(x, y, z));
                 for (uint i = range.x; i < range.y; i++)
-                    if (reaches(l, push.grid_capacity + order[i]))
-                        take(l, push.grid_capacity + order[i], gather_slot_tile(order[i], tiles));
+                    if (reaches(l, push.grid_capacity + i))
+                        take(l, push.grid_capacity + i, tiles > 1u ? gather_slot_tile(order[i], tiles) : 0u);
             }
 }
 #endif
 
 void walk(list_cell l)
 {
+    only = gather_range(ranges[l.first_range].first, 0u);
     for (uint t = 0u; t < l.tiles; t++)
         ranges[l.first_range + t].count = 0u;
 #ifdef START_LEVEL_0
@@ -106,6 +116,8 @@ void walk(list_cell l)
     else
 #endif
         walk_vertices(l);
+    if (l.tiles == 1u)
+        ranges[l.first_range].count = only.count;
 }
 
 // Gives the counted lists their places. False: there is no room.

@@ -639,6 +639,38 @@ TEST(gathering_adds_up_the_lights_of_the_volumes)
 }
 
 // Lists that find no room are replaced by all lights of the level: the same light, to the bit, from the same lights.
+// With rays to the centres, the luminance of U is that of the light from which the samples were picked.
+TEST(gathered_samples_stand_for_all_of_the_light)
+{
+    static const char *const exports[] = {"shadow_u", "indirect", "reservoirs"};
+    for (uint32_t start_level = 0; start_level < 2; start_level++) {
+        render_settings s = small_settings(96, 64, 5000);
+        s.start_level = start_level;
+        s.shadow_samples = 4;
+        s.end_point = END_POINT_CENTRE;
+        fixture f = fixture_create(SCENES "cornell.glb", NULL, &s);
+        export_names(f.r, exports, countof(exports));
+        CHECK(renderer_frame(f.r));
+        float *u = read_image(f.r, "shadow_u"), *light = read_image(f.r, "indirect");
+        uint32_t *words = read_buffer(f.r, "reservoirs"), of_vpls = 0;
+        double worst = 0;
+        for (size_t i = 0; i < 96 * 64; i++) {
+            const double a = 0.2126 * u[4 * i] + 0.7152 * u[4 * i + 1] + 0.0722 * u[4 * i + 2];
+            const double b = 0.2126 * light[4 * i] + 0.7152 * light[4 * i + 1] + 0.0722 * light[4 * i + 2];
+            worst = fmax(worst, b > 0 ? fabs(a - b) / b : 0);
+            for (uint32_t k = 1; k <= 4; k++)
+                of_vpls += words[5 * i + k] != UINT32_MAX && words[5 * i + k] >> 31;
+        }
+        printf("  start level %u: U off by %.1e at worst, %u samples of VPLs\n", start_level, worst, of_vpls);
+        CHECK(worst < 1e-3);
+        CHECK((of_vpls > 0) == (start_level == 0));
+        free(u);
+        free(light);
+        free(words);
+        fixture_destroy(&f);
+    }
+}
+
 TEST(lists_that_do_not_fit_change_nothing)
 {
     static const char *const names[] = {"indirect", "reservoirs"};
@@ -787,6 +819,7 @@ int main(void)
     RUN(exact_reservoirs_pick_light_i_with_probability_f_i);
     RUN(gathered_reservoirs_pick_light_i_with_probability_f_i);
     RUN(gathering_adds_up_the_lights_of_the_volumes);
+    RUN(gathered_samples_stand_for_all_of_the_light);
     RUN(lists_that_do_not_fit_change_nothing);
     RUN(a_thin_wall_keeps_the_light_out);
     RUN(two_runs_give_the_same_bytes);
