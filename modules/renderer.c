@@ -36,13 +36,40 @@ static render_camera camera_of_bounds(const renderer *r)
     return camera;
 }
 
+static const float *node_local(const renderer *r, uint32_t node)
+{
+    const node_component *component = ecs_get(r->world, r->gpu_world->node_entities[node], r->gpu_world->node);
+    return component ? component->matrix : r->scene->nodes[node].matrix;
+}
+
+// Where the scene's node stands by the node components of it and its parents: before the transforms of the next frame
+// are made. As the loader multiplies them, so that a node that nothing moved is where the loader put it.
+static void node_world(const renderer *r, uint32_t node, float world[16])
+{
+    const scene_node *nodes = r->scene->nodes;
+    uint32_t depth = 0;
+    for (uint32_t i = node; i != SCENE_NONE; i = nodes[i].parent)
+        depth++;
+    uint32_t *chain = memory_alloc(depth * sizeof *chain); // from the root
+    for (uint32_t i = node, k = depth; i != SCENE_NONE; i = nodes[i].parent)
+        chain[--k] = i;
+    memcpy(world, node_local(r, chain[0]), 16 * sizeof(float));
+    for (uint32_t k = 1; k < depth; k++) {
+        float parent[16];
+        memcpy(parent, world, sizeof parent);
+        scene_matrix_multiply(parent, node_local(r, chain[k]), world);
+    }
+    free(chain);
+}
+
 render_camera renderer_camera_of_scene(const renderer *r, uint32_t index)
 {
     if (index == SCENE_NONE)
         return camera_of_bounds(r);
     assert(index < r->scene->camera_count);
     const scene_camera *source = &r->scene->cameras[index];
-    const float *world = r->scene->nodes[source->node].world;
+    float world[16];
+    node_world(r, source->node, world);
     render_camera camera = {.yfov = source->yfov, .near_plane = source->near_plane};
     for (int k = 0; k < 3; k++) {
         camera.eye[k] = world[12 + k];
@@ -216,11 +243,11 @@ renderer *renderer_create(gpu *gpu, const scene_data *scene, const render_settin
     const component_desc state_desc = {
         .name = "pass_state", .size = sizeof(pass_state), .fini = pass_state_fini, .user = r};
     r->pass_state = ecs_component_register(r->world, &state_desc);
-    r->camera = renderer_camera_of_scene(r, scene->camera_count ? 0 : SCENE_NONE);
     if (!r->graph || !world_init(r) || !modules_init(r)) {
         renderer_destroy(r);
         return NULL;
     }
+    r->camera = renderer_camera_of_scene(r, scene->camera_count ? 0 : SCENE_NONE);
     const ecs_system_desc constants = {
         .name = "constants", .phase = ECS_PHASE_EXTRACT, .run = constants_extract, .user = r};
     ecs_system_register(r->world, &constants);

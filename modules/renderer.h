@@ -53,7 +53,8 @@
 //   probes             probe[]       see modules/probe.h                               probe
 //   vpl_flux           vec3[paths]   of the traced light paths at their last hit                      vpl_trace
 //   vpl_changed        uint[]        a bit a slot, where not all VPLs are traced anew; see vpl_trace.h  vpl_trace
-//   vpl_mask, vpl_list bits and numbers of the paths that are; vpl_shares, vpl_sources, vpl_elements: see shaders/shared.h
+//   vpl_mask, vpl_list bits and numbers of the paths that are; vpl_shares, vpl_sources, vpl_elements: see
+//   shaders/shared.h
 #pragma once
 
 #include "engine/ecs.h"
@@ -88,6 +89,7 @@ typedef struct renderer {
     component_type pass; // render_pass
     component_type pass_state; // what renderer_pass_add keeps of a pass, switched on or off
     struct world_gpu *gpu_world; // modules/world.c
+    double time; // seconds, of the next frame, by the clock of its animations; may be changed between frames
     uint32_t frame; // number of frames rendered so far
     double milliseconds; // that the last frame took, by the clock
     bool failed; // in the current frame; systems set it after logging why
@@ -99,7 +101,7 @@ void renderer_destroy(renderer *r); // accepts NULL
 // Runs the world's systems once: one frame. False when the device or a declaration failed (logged).
 bool renderer_frame(renderer *r);
 
-// A camera of the scene, or with SCENE_NONE one that frames the whole scene.
+// A camera of the scene, where its node is now, or with SCENE_NONE one that frames the whole scene at rest.
 render_camera renderer_camera_of_scene(const renderer *r, uint32_t camera);
 
 // ---- For modules. A pass is an entity with a `render_pass` component and a component for its own state. Removing the

@@ -14,6 +14,7 @@ typedef struct scene_node {
     bool has_trs;
     float translation[3], rotation[4], scale[3]; // rotation: unit quaternion x y z w
     uint32_t mesh, camera, light; // SCENE_NONE: none
+    uint32_t skin; // SCENE_NONE: none; with one, the node's own transform does not move its mesh
     float world[16];
 } scene_node;
 enum { SCENE_NONE = UINT32_MAX };
@@ -21,7 +22,82 @@ enum { SCENE_NONE = UINT32_MAX };
 typedef struct scene_mesh {
     const char *name;
     uint32_t first_primitive, primitive_count;
+    uint32_t deformation; // SCENE_NONE: its vertices never change
 } scene_mesh;
+
+// ---- Deformation. A node whose mesh is skinned or morphed has a mesh of its own, so that each has vertices of its own
+// to change. Vertices and attributes of the scene are those at rest: the mesh as it came.
+
+enum { SCENE_INFLUENCES = 8 };
+typedef struct scene_influences { // of a vertex
+    uint16_t joints[SCENE_INFLUENCES]; // index into the skin's joints
+    float weights[SCENE_INFLUENCES]; // sum 1; unused ones 0, last
+} scene_influences;
+
+typedef struct scene_morph { // what a morph target adds to a vertex, times its weight
+    float position[3], normal[3], tangent[3];
+} scene_morph;
+
+typedef struct scene_deformation {
+    uint32_t mesh, node;
+    uint32_t first_vertex, vertex_count; // of all its primitives, one after the other
+    uint32_t skin; // SCENE_NONE: none
+    const scene_influences *influences; // [vertex_count]; NULL without a skin
+    uint32_t target_count;
+    const scene_morph *morphs; // [target][vertex]
+    const float *weights; // [target]: at rest, the node's or else the mesh's
+} scene_deformation;
+
+typedef struct scene_skin {
+    const char *name;
+    uint32_t joint_count;
+    const uint32_t *joints; // nodes
+    const float (*inverse_bind)[16]; // column-major, from mesh space to the joint's at rest
+} scene_skin;
+
+// ---- Animation
+
+typedef enum scene_interpolation {
+    SCENE_STEP,
+    SCENE_LINEAR, // rotations: slerp by the shorter arc
+    SCENE_CUBIC, // Hermite spline; of each key in-tangent, value, out-tangent
+} scene_interpolation;
+
+typedef enum scene_target { // what a channel changes, and how many numbers it is
+    SCENE_TRANSLATION, // of a node: 3
+    SCENE_ROTATION, // of a node: 4, unit quaternion x y z w
+    SCENE_SCALE, // of a node: 3
+    SCENE_WEIGHTS, // of a node's morph targets: as many as they are
+    // KHR_animation_pointer
+    SCENE_LIGHT_COLOR, // of a light: 3, linear
+    SCENE_LIGHT_INTENSITY, // 1
+    SCENE_LIGHT_INNER_CONE, // 1, radians
+    SCENE_LIGHT_OUTER_CONE, // 1, radians
+    SCENE_BASE_COLOR, // of a material: 4, linear
+    SCENE_EMISSIVE_FACTOR, // 3, linear
+    SCENE_EMISSIVE_STRENGTH, // 1, nits
+} scene_target;
+
+typedef struct scene_channel {
+    scene_target target;
+    uint32_t index; // node, light or material
+    scene_interpolation interpolation;
+    uint32_t width; // numbers of a value
+    uint32_t key_count; // at least 1
+    const float *times; // [key_count], seconds, strictly increasing
+    const float *values; // [key_count][width], or [key_count][3][width] where cubic
+} scene_channel;
+
+typedef struct scene_animation {
+    const char *name;
+    const scene_channel *channels;
+    uint32_t channel_count;
+    float duration; // seconds: the last key's time
+} scene_animation;
+
+typedef struct scene_emission { // of a material, whose `emissive` is the product
+    float factor[3], strength;
+} scene_emission;
 
 typedef struct scene_image {
     const char *name;
@@ -40,6 +116,7 @@ typedef struct scene_light { // KHR_lights_punctual; the node gives position and
     const char *name;
     uint32_t type; // LIGHT_*
     float color[3]; // linear, times intensity: candela, or lux for directional
+    float hue[3], intensity; // whose product it is
     float inner_cone, outer_cone; // radians
 } scene_light;
 
@@ -65,6 +142,7 @@ typedef struct scene_data {
     uint32_t index_count;
     material *materials; // the last one is glTF's default material
     const char **material_names;
+    scene_emission *emissions; // per material; may be NULL where none is animated
     uint32_t material_count;
     scene_image *images;
     uint32_t image_count;
@@ -74,7 +152,12 @@ typedef struct scene_data {
     uint32_t light_count;
     scene_camera *cameras;
     uint32_t camera_count;
-    uint32_t animation_count, skin_count; // counted; not played yet
+    scene_animation *animations;
+    uint32_t animation_count;
+    scene_skin *skins;
+    uint32_t skin_count;
+    scene_deformation *deformations;
+    uint32_t deformation_count;
     uint64_t instanced_triangles; // over all nodes
     float bounds_min[3], bounds_max[3]; // world, over all nodes' meshes; both 0 when there is no geometry;
                                         // transformed boxes, so larger than need be where nodes are rotated
@@ -95,6 +178,10 @@ void scene_destroy(scene_data *scene); // accepts NULL
 // (halves of n/2, axis by the surface area heuristic), so that drivers that build BVHs by halving the list as given
 // build good ones. O(n log n); the same on every machine.
 void scene_primitive_reorder(uint32_t *indices, uint32_t index_count, const float (*positions)[3]);
+
+// The matrices of nodes: column-major; the rotation is a unit quaternion x y z w.
+void scene_matrix_multiply(const float a[16], const float b[16], float out[16]); // `out` may be neither
+void scene_matrix_compose(const float translation[3], const float rotation[4], const float scale[3], float out[16]);
 
 // What `lanternfield info` prints.
 void scene_print_info(const scene_data *scene, FILE *out);

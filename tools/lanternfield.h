@@ -30,6 +30,9 @@ typedef struct render_request { // strings belong to argv
     float eye[3], target[3]; // world, metres
     float fov; // degrees, vertical
     float sun[4]; // direction in which the light travels, lux
+    const char *animation; // name, or "all"; NULL: at rest
+    bool has_time;
+    float time; // seconds
     const char *stats, *dump_graph, *device; // NULL: not asked for
     const char *state; // file that keeps a progressive picture; NULL: none
     bool validate;
@@ -51,7 +54,8 @@ typedef struct render_session {
     gpu *gpu;
     renderer *renderer;
 } render_session;
-bool render_session_open(render_session *session, const render_request *request); // false: logged; close it all the same
+bool render_session_open(render_session *session,
+                         const render_request *request); // false: logged; close it all the same
 void render_session_close(render_session *session);
 // Text that names all that a picture depends on: the scene by hashes of what was loaded, camera, sun, size, and those
 // settings that the method reads; for the progressive methods without what only says how long they go on. One line
