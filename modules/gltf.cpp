@@ -441,6 +441,7 @@ extern "C" void gltf_primitive_free(gltf_primitive *primitive)
     free(primitive->positions);
     free(primitive->attributes);
     free(primitive->indices);
+    free(primitive->tags);
 }
 
 extern "C" bool gltf_import(const char *path, scene_data *scene, gltf_primitive **primitives)

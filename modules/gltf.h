@@ -67,6 +67,7 @@ typedef struct gltf_primitive { // a triangle list as it came, vertices only tho
     float (*positions)[3];
     vertex_attributes *attributes;
     uint32_t *indices; // in range; a multiple of three
+    uint32_t *tags; // a number that stays with its vertex, for scene_subdivision.c; NULL: none
     bool has_normals, has_tangents;
 } gltf_primitive;
 
@@ -80,6 +81,13 @@ void gltf_primitive_free(gltf_primitive *primitive);
 // Orders the triangles of a mesh for a BVH builder that halves the list of all of them: each primitive's indices in
 // place, and in sequence[count] the order in which the primitives have to follow each other.
 void mesh_triangles_reorder(gltf_primitive *primitives, uint32_t count, uint32_t *sequence);
+
+// ---- scene_subdivision.c
+
+// Adds a mesh for each level of the meshes that have rules; `primitives`, one for each of the scene's, grows with them.
+void scene_subdivide(scene_data *scene, gltf_primitive **primitives);
+// When the scene's vertices have their final places: the stencils follow.
+void scene_subdivisions_finish(scene_data *scene, const gltf_primitive *primitives);
 
 // ---- scene.c
 

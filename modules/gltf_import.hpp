@@ -6,6 +6,7 @@ extern "C" {
 #include "modules/gltf.h"
 }
 
+#include <array>
 #include <stdexcept>
 #include <string>
 #include <tiny_gltf.h>
@@ -64,5 +65,12 @@ void views_check(importer &in);
 void accessors_check(importer &in);
 gltf_bytes view_bytes(const importer &in, uint32_t view);
 void meshes_read(importer &in);
+// All positions that the primitive's accessor has, used or not.
+std::vector<std::array<float, 3>> positions_all(const importer &in, const tinygltf::Primitive &primitive,
+                                                const std::string &where);
+
+// gltf_subdivision.cpp
+// What the mesh's extras say; NULL when they say nothing, or something wrong, which is a warning.
+const scene_subdivision_rules *subdivision_rules_read(importer &in, size_t mesh);
 
 } // namespace gltf

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstring>
 #include <initializer_list>
+#include <numeric>
 
 namespace gltf
 {
@@ -465,6 +466,23 @@ gltf_bytes view_bytes(const importer &in, uint32_t view)
     return {buffer.bytes.data + source.byteOffset, source.byteLength};
 }
 
+std::vector<std::array<float, 3>> positions_all(const importer &in, const tinygltf::Primitive &primitive,
+                                                const std::string &where)
+{
+    const auto position = primitive.attributes.find("POSITION");
+    if (position == primitive.attributes.end()) {
+        return {};
+    }
+    const size_t count =
+        in.model.accessors[index_check(position->second, in.model.accessors.size(), where, "accessor")].count;
+    std::vector<uint32_t> all(count);
+    std::iota(all.begin(), all.end(), 0u);
+    std::vector<std::array<float, 3>> positions(count);
+    attribute_read(in, primitive, position_rule, all, where,
+                   [&](uint32_t i, const float *p) { std::copy_n(p, 3, positions[i].begin()); });
+    return positions;
+}
+
 void views_check(importer &in)
 {
     for (size_t i = 0; i < in.model.bufferViews.size(); i++) {
@@ -497,6 +515,8 @@ void meshes_read(importer &in)
         const tinygltf::Mesh &mesh = in.model.meshes[i];
         scene_mesh &out = scene->meshes[scene->mesh_count++];
         out.name = in.keep(mesh.name);
+        out.deformation = SCENE_NONE;
+        out.subdivision_rules = subdivision_rules_read(in, i);
         out.first_primitive = static_cast<uint32_t>(list.size());
         for (size_t k = 0; k < mesh.primitives.size(); k++) {
             primitive_read(in, mesh.primitives[k], label("mesh", i, mesh.name) + " primitive " + std::to_string(k),

@@ -84,6 +84,7 @@ static void flat_normals_make(gltf_primitive *p)
 {
     float(*const positions)[3] = memory_alloc(p->index_count * sizeof(*positions));
     vertex_attributes *const attributes = memory_alloc(p->index_count * sizeof(*attributes));
+    uint32_t *const tags = p->tags ? memory_alloc(p->index_count * sizeof(*tags)) : NULL;
     for (uint32_t i = 0; i < p->index_count; i++) {
         float normal[3];
         triangle_cross(p, p->indices + i / 3 * 3, normal);
@@ -91,14 +92,19 @@ static void flat_normals_make(gltf_primitive *p)
         memcpy(positions[i], p->positions[p->indices[i]], sizeof(*positions));
         attributes[i] = p->attributes[p->indices[i]];
         memcpy(attributes[i].normal, normal, sizeof(normal));
+        if (tags) {
+            tags[i] = p->tags[p->indices[i]];
+        }
     }
     for (uint32_t i = 0; i < p->index_count; i++) {
         p->indices[i] = i;
     }
     free(p->positions);
     free(p->attributes);
+    free(p->tags);
     p->positions = positions;
     p->attributes = attributes;
+    p->tags = tags;
     p->vertex_count = p->index_count;
 }
 
@@ -205,6 +211,9 @@ static void vertices_renumber(gltf_primitive *p)
     meshopt_remapIndexBuffer(p->indices, p->indices, p->index_count, remap);
     meshopt_remapVertexBuffer(p->positions, p->positions, p->vertex_count, sizeof(*p->positions), remap);
     meshopt_remapVertexBuffer(p->attributes, p->attributes, p->vertex_count, sizeof(*p->attributes), remap);
+    if (p->tags) {
+        meshopt_remapVertexBuffer(p->tags, p->tags, p->vertex_count, sizeof(*p->tags), remap);
+    }
     p->vertex_count = (uint32_t)used;
     free(remap);
 }
@@ -420,8 +429,10 @@ scene_data *scene_load(const char *path)
     if (!gltf_import(path, scene, &primitives)) {
         goto fail;
     }
+    scene_subdivide(scene, &primitives);
     primitives_finish(scene, primitives);
     primitives_concatenate(scene, primitives);
+    scene_subdivisions_finish(scene, primitives);
     for (uint32_t i = 0; i < scene->primitive_count; i++) {
         gltf_primitive_free(&primitives[i]);
     }
@@ -514,6 +525,18 @@ static void print_cameras(const scene_data *scene, FILE *out)
     }
 }
 
+static void print_subdivisions(const scene_data *scene, FILE *out)
+{
+    for (uint32_t i = 0; i < scene->subdivision_count; i++) {
+        const scene_subdivision *const s = &scene->subdivisions[i];
+        const scene_mesh *const coarse = &scene->meshes[s->levels[0].mesh],
+                                *const fine = &scene->meshes[s->levels[s->level_count - 1].mesh];
+        fprintf(out, "subdivided: \"%s\", levels 1 to %u, %llu to %llu triangles\n", scene->meshes[s->mesh].name,
+                s->level_count, (unsigned long long)mesh_triangle_count(scene, coarse),
+                (unsigned long long)mesh_triangle_count(scene, fine));
+    }
+}
+
 void scene_print_info(const scene_data *scene, FILE *out)
 {
     uint32_t instances = 0;
@@ -523,6 +546,7 @@ void scene_print_info(const scene_data *scene, FILE *out)
     fprintf(out, "scene: %s\n", scene->path);
     fprintf(out, "triangles: %u (%llu with instances)\n", scene->index_count / 3,
             (unsigned long long)scene->instanced_triangles);
+    print_subdivisions(scene, out);
     fprintf(out, "vertices: %u\n", scene->vertex_count);
     fprintf(out, "meshes: %u (%u primitives, %u instances)\n", scene->mesh_count, scene->primitive_count, instances);
     fprintf(out, "materials: %u\n", scene->material_count - 1); // without the default one
