@@ -133,19 +133,20 @@ void subdivide_stencils_destroy(gpu *gpu, const subdivide_stencils *stencils)
 }
 
 void subdivide_record(gpu_commands *commands, gpu_pipeline pipeline, const subdivide_stencils *stencils,
-                      const scene_subdivision *source, uint32_t level, gpu_buffer positions, gpu_buffer attributes)
+                      const scene_subdivision *source, uint32_t level, const subdivide_target *target)
 {
-    const gpu_binding bindings[] = {{.buffer = positions},
-                                    {.buffer = attributes},
-                                    {.buffer = stencils->vertices},
-                                    {.buffer = stencils->offsets},
-                                    {.buffer = stencils->entries}};
+    const gpu_binding bindings[] = {
+        {.buffer = target->positions}, {.buffer = target->attributes}, {.buffer = stencils->vertices},
+        {.buffer = stencils->offsets}, {.buffer = stencils->entries},  {.buffer = target->previous_positions},
+    };
     const scene_subdivision_level *to = &source->levels[level - 1];
     const subdivision_step step = {
         .first_source = source->first_vertex,
         .first_vertex = to->first_vertex,
         .vertex_count = to->vertex_count,
         .first = vertices_before(source, level),
+        .first_kept = target->first_kept,
+        .is_new = target->is_new,
     };
     gpu_bind(commands, pipeline, bindings, countof(bindings));
     gpu_push(commands, &step, sizeof step);

@@ -22,8 +22,15 @@ typedef struct subdivide_stencils { // of one scene_subdivision, for shaders/sub
 bool subdivide_stencils_create(gpu *gpu, const scene_subdivision *source, subdivide_stencils *stencils);
 void subdivide_stencils_destroy(gpu *gpu, const subdivide_stencils *stencils);
 
-// Records the evaluation of `level` (from 1): from the vertices of the cage's mesh in `positions` to those of the
-// level, with their normals and tangents in `attributes`; both buffers hold the whole scene. The caller sees to it that
-// the cage's positions are there, by a barrier, and that nobody reads the level's meanwhile.
+typedef struct subdivide_target { // buffers of the whole scene
+    gpu_buffer positions, attributes;
+    gpu_buffer previous_positions; // from `first_kept` on: where the level's vertices were
+    uint32_t first_kept;
+    bool is_new; // they were nowhere: what is drawn for the first time has not moved
+} subdivide_target;
+
+// Records the evaluation of `level` (from 1): from the vertices of the cage's mesh in the positions to those of the
+// level, with their normals and tangents in the attributes. The caller sees to it that the cage's positions are there,
+// by a barrier, and that nobody reads the level's meanwhile.
 void subdivide_record(gpu_commands *commands, gpu_pipeline pipeline, const subdivide_stencils *stencils,
-                      const scene_subdivision *source, uint32_t level, gpu_buffer positions, gpu_buffer attributes);
+                      const scene_subdivision *source, uint32_t level, const subdivide_target *target);

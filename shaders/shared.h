@@ -162,7 +162,9 @@ SHARED_STRUCT(subdivision_step) { // of one refined mesh
     uint first_source; // vertex that the entries count from
     uint first_vertex, vertex_count; // what is written
     uint first; // of its subdivision_vertex structs
-} SHARED_END(subdivision_step, 16)
+    uint first_kept; // in the previous positions
+    uint is_new; // 1: it was not drawn in the last frame, so that its vertices have not moved since
+} SHARED_END(subdivision_step, 24)
 
 // ---- Rays
 

@@ -1,4 +1,5 @@
-// A refined mesh follows its control cage: limit positions, normals and tangents by the stencils.
+// A refined mesh follows its control cage: limit positions, normals and tangents by the stencils. Where a vertex was is
+// kept for motion vectors.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_scalar_block_layout : require
@@ -10,6 +11,7 @@ layout(set = 0, binding = 1, scalar) buffer attributes_block { vertex_attributes
 layout(set = 0, binding = 2, scalar) readonly buffer vertices_block { subdivision_vertex vertices[]; };
 layout(set = 0, binding = 3, scalar) readonly buffer offsets_block { uint offsets[]; };
 layout(set = 0, binding = 4, scalar) readonly buffer entries_block { subdivision_entry entries[]; };
+layout(set = 0, binding = 5, scalar) writeonly buffer previous_block { vec3 previous_positions[]; };
 layout(push_constant, scalar) uniform step_block { subdivision_step step_; };
 
 // False, and `v` as it was, when it has no direction. Scaled first, so that no length over- or underflows.
@@ -36,6 +38,7 @@ void main()
         tangent2 += entries[k].tangent2 * p;
     }
     uint to = step_.first_vertex + i;
+    previous_positions[step_.first_kept + i] = step_.is_new != 0u ? position : positions[to];
     positions[to] = position;
     vec3 normal = cross(tangent1, tangent2);
     if (direction_of(normal)) // else the surface has none here, and the last one stays

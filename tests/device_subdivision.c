@@ -87,25 +87,40 @@ TEST(the_devices_stencils_are_the_cpus)
     const VkDeviceSize attributes_size = scene->vertex_count * sizeof *scene->attributes;
     const gpu_buffer positions = storage_of(scene->positions, positions_size);
     const gpu_buffer attributes = storage_of(scene->attributes, attributes_size);
+    const gpu_buffer previous = storage_of(NULL, positions_size);
     subdivide_stencils stencils = {0};
     CHECK(subdivide_stencils_create(device, &scene->subdivisions[0], &stencils));
     const gpu_compute_pipeline_desc desc = {.shader = &shader_subdivide_comp};
     const gpu_pipeline pipeline = gpu_compute_pipeline_create(device, &desc);
     gpu_commands *commands = gpu_commands_begin(device);
-    for (uint32_t level = 1; level <= 4; level++)
-        subdivide_record(commands, pipeline, &stencils, &scene->subdivisions[0], level, positions, attributes);
+    for (uint32_t level = 1; level <= 4; level++) {
+        const subdivide_target target = {.positions = positions,
+                                         .attributes = attributes,
+                                         .previous_positions = previous,
+                                         .first_kept = scene->subdivisions[0].levels[level - 1].first_vertex,
+                                         .is_new = level == 2};
+        subdivide_record(commands, pipeline, &stencils, &scene->subdivisions[0], level, &target);
+    }
     CHECK(gpu_commands_submit_and_wait(device, commands));
 
     float(*moved)[3] = memory_alloc(positions_size);
     vertex_attributes *shaded = memory_alloc(attributes_size);
     CHECK(gpu_buffer_read(device, positions, 0, moved, positions_size));
     CHECK(gpu_buffer_read(device, attributes, 0, shaded, attributes_size));
-    for (uint32_t level = 1; level <= 4; level++)
+    float(*before)[3] = memory_alloc(positions_size);
+    CHECK(gpu_buffer_read(device, previous, 0, before, positions_size));
+    for (uint32_t level = 1; level <= 4; level++) {
         level_compare(scene, level, moved, shaded);
+        const scene_subdivision_level *l = &scene->subdivisions[0].levels[level - 1];
+        const float(*was)[3] = level == 2 ? (const float(*)[3])moved : (const float(*)[3])scene->positions;
+        CHECK(memcmp(before + l->first_vertex, was + l->first_vertex, l->vertex_count * sizeof *was) == 0);
+    }
+    free(before);
     free(moved);
     free(shaded);
     subdivide_stencils_destroy(device, &stencils);
     gpu_pipeline_destroy(device, pipeline);
+    gpu_buffer_destroy(device, previous);
     gpu_buffer_destroy(device, positions);
     gpu_buffer_destroy(device, attributes);
     scene_destroy(scene);
