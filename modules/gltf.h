@@ -1,6 +1,7 @@
 // The glTF import's inner interface, for scene.c and gltf_*: a file goes through gltf_file.c (container, buffers),
-// gltf_json.c (checks), gltf.cpp, gltf_material.cpp and gltf_mesh.cpp (tinygltf's structures to ours) and gltf_image.c
-// (decoding); scene.c finishes what comes out, with triangle_order.c. Others include scene.h.
+// gltf_json.c (checks), gltf.cpp, gltf_accessor.cpp, gltf_material.cpp, gltf_mesh.cpp, gltf_skin.cpp,
+// gltf_animation.cpp and gltf_subdivision.cpp (tinygltf's structures to ours) and gltf_image.c (decoding); scene.c
+// finishes what comes out, with scene_subdivision.c and triangle_order.c. Others include scene.h.
 #pragma once
 
 #include "scene.h"
@@ -69,10 +70,14 @@ typedef struct gltf_primitive { // a triangle list as it came, vertices only tho
     uint32_t *indices; // in range; a multiple of three
     uint32_t *tags; // a number that stays with its vertex, for scene_subdivision.c; NULL: none
     bool has_normals, has_tangents;
+    scene_influences *influences; // [vertex_count]; NULL: no skin moves it
+    uint32_t target_count;
+    scene_morph *morphs; // [target_count][vertex_count]; NULL: none
 } gltf_primitive;
 
-// Fills `scene` (zeroed but for path and arena) but for vertices, indices, bounds and world matrices;
-// `primitives` gets scene->primitive_count entries, to free(). False on failure, logged; the rest is then freed.
+// Fills `scene` (zeroed but for path and arena) but for vertices, indices, bounds, world matrices and what deformations
+// know of vertices; `primitives` gets scene->primitive_count entries, to free(). False on failure, logged; the rest is
+// then freed.
 bool gltf_import(const char *path, scene_data *scene, gltf_primitive **primitives);
 void gltf_primitive_free(gltf_primitive *primitive);
 
@@ -86,7 +91,8 @@ void mesh_triangles_reorder(gltf_primitive *primitives, uint32_t count, uint32_t
 
 // Adds a mesh for each level of the meshes that have rules; `primitives`, one for each of the scene's, grows with them.
 void scene_subdivide(scene_data *scene, gltf_primitive **primitives);
-// When the scene's vertices have their final places: the stencils follow.
+// When the scene's vertices have their final places and deformations: stencils follow, and levels deform with their
+// cages.
 void scene_subdivisions_finish(scene_data *scene, const gltf_primitive *primitives);
 
 // ---- scene.c

@@ -11,6 +11,7 @@
 // Names in the frame graph (images are width x height unless said otherwise; light is "radiance over albedo": what a
 // white Lambertian surface would send out, in nits, so that radiance = albedo * light):
 //
+//   positions, attributes, previous_positions  buffers of the scene set, where it deforms meshes: see deform.h  deform
 //   tlas               acceleration  the scene, for ray queries                        acceleration
 //   vpls               vpl[slots]    see renderer_vpl_slots          vpl_trace; vpl_reference where it keeps them
 //   lgh_header         lgh_header                                                      lgh_build

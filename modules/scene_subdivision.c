@@ -674,13 +674,40 @@ static void level_finish(scene_data *scene, const gltf_primitive *primitives, co
     }
 }
 
+// Where the cage deforms, its levels do.
+static void levels_deform(scene_data *scene, const scene_subdivision *s)
+{
+    const uint32_t cage = scene->meshes[s->mesh].deformation;
+    for (uint32_t level = 1; cage != SCENE_NONE && level <= s->level_count; level++) {
+        const scene_subdivision_level *const to = &s->levels[level - 1];
+        scene->meshes[to->mesh].deformation = scene->deformation_count;
+        scene->deformations[scene->deformation_count++] = (scene_deformation){
+            .mesh = to->mesh,
+            .node = scene->deformations[cage].node,
+            .first_vertex = to->first_vertex,
+            .vertex_count = to->vertex_count,
+            .skin = scene->deformations[cage].skin,
+            .subdivision = s,
+            .level = level,
+            .cage = cage,
+        };
+    }
+}
+
 void scene_subdivisions_finish(scene_data *scene, const gltf_primitive *primitives)
 {
+    const uint32_t limit = scene->deformation_count + scene->subdivision_count * SUBDIVISION_LEVELS_MAX;
+    scene_deformation *const deformations = arena_alloc(&scene->arena, limit * sizeof(*deformations));
+    for (uint32_t i = 0; i < scene->deformation_count; i++) {
+        deformations[i] = scene->deformations[i];
+    }
+    scene->deformations = deformations;
     for (uint32_t i = 0; i < scene->subdivision_count; i++) {
         scene_subdivision *const s = &scene->subdivisions[i];
         stencils_follow(scene, primitives, s);
         for (uint32_t level = 0; level < s->level_count; level++) {
             level_finish(scene, primitives, s, &s->levels[level]);
         }
+        levels_deform(scene, s);
     }
 }

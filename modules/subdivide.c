@@ -54,8 +54,12 @@ static float length_of(const float v[3])
 }
 
 // Length of the cage's edges where the instance is nearest to the eye, in pixels.
-static float edge_pixels(const renderer *r, const scene_subdivision *s, const float world[16])
+static float edge_pixels(const renderer *r, const scene_subdivision *s, const float node_world[16])
 {
+    static const float identity[16] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
+    const float *world = world_is_skinned(r, s->mesh) ? identity : node_world;
+    const world_deformation *deformation = world_deformation_of(r, s->mesh);
+    const float edge = s->edge_length * (deformation ? deformation->scale : 1);
     float centre[3], from_eye[3], scale = 0;
     const float radius = mesh_sphere(r, s->mesh, centre);
     for (int k = 0; k < 3; k++) {
@@ -65,7 +69,7 @@ static float edge_pixels(const renderer *r, const scene_subdivision *s, const fl
     }
     const float distance = fmaxf(length_of(from_eye) - scale * radius, r->camera.near_plane);
     const float pixels = (float)r->settings.height / (2 * tanf(r->camera.yfov / 2)); // of a metre a metre away
-    return s->edge_length * scale * pixels / distance;
+    return edge * scale * pixels / distance;
 }
 
 static uint32_t level_mesh(const scene_subdivision *s, uint32_t level)

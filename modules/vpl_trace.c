@@ -2,8 +2,9 @@
 // rays are one batch, and each bounce makes of a batch's hits the next.
 //
 // VPLs stay from frame to frame. A path is traced again when its source changed, or when one of its segments meets the
-// box of a surface that came, went or moved; so the slots of all others are what tracing them again would make, to the
-// bit. (But where two instances' surfaces coincide: there it is the order of traversal that chooses.)
+// box of a surface that came, went, moved or deformed; so the slots of all others are what tracing them again would
+// make, to the bit. (But where two instances' surfaces coincide: there it is the order of traversal that chooses.)
+#include "deform.h"
 #include "modules.h"
 #include "rays.h"
 #include "resource_chain.h"
@@ -162,6 +163,7 @@ static void bounce_declare(renderer *r, vpl_trace *state, vpl_chains *chains, ui
         resource_chain_next(&chains->changed, pass);
         frame_graph_read(pass, "vpl_list", ACCESS_INDIRECT);
     }
+    deform_read(pass);
 }
 
 static void buffers_import(renderer *r, const vpl_trace *state)

@@ -46,11 +46,27 @@ void *world_buffer_reserve(renderer *r, gpu_buffer *buffer, const char *name, ui
 
 // ---- Entities
 
+static void weights_spawn(renderer *r, const scene_deformation *d)
+{
+    if (d->target_count == 0)
+        return;
+    const size_t size = d->target_count * sizeof(float);
+    weights_component *weights = ecs_add(r->world, r->gpu_world->node_entities[d->node], r->gpu_world->weights);
+    *weights = (weights_component){memory_alloc(size), d->target_count};
+    memcpy(weights->weights, d->weights, size);
+}
+
+static void weights_fini(void *component, void *user)
+{
+    (void)user;
+    free(((weights_component *)component)->weights);
+}
+
 static void scene_spawn(renderer *r)
 {
     const scene_data *s = r->scene;
-    const world_gpu *w = r->gpu_world;
-    entity *entities = memory_alloc(max_u32(s->node_count, 1) * sizeof *entities);
+    world_gpu *w = r->gpu_world;
+    entity *entities = w->node_entities = memory_alloc(max_u32(s->node_count, 1) * sizeof *entities);
     for (uint32_t i = 0; i < s->node_count; i++) {
         const scene_node *source = &s->nodes[i];
         entities[i] = ecs_entity_create(r->world);
@@ -69,7 +85,8 @@ static void scene_spawn(renderer *r)
             light->outer_cone = from->outer_cone;
         }
     }
-    free(entities);
+    for (uint32_t i = 0; i < s->deformation_count; i++)
+        weights_spawn(r, &s->deformations[i]);
 }
 
 entity world_sun_add(renderer *r, const float direction[3], float lux)
@@ -97,7 +114,7 @@ entity world_sun_add(renderer *r, const float direction[3], float lux)
 
 // ---- Transforms
 
-static void matrix_multiply(const float a[16], const float b[16], float product[16])
+void world_matrix_multiply(const float a[16], const float b[16], float product[16])
 {
     mat4 left, right; // over-aligned, so copies
     memcpy(left, a, sizeof left);
@@ -125,7 +142,7 @@ static void transform_update(renderer *r, entity e)
     }
     memcpy(transform->previous_world, transform->world, sizeof transform->world);
     if (parent)
-        matrix_multiply(parent->world, node->matrix, transform->world);
+        world_matrix_multiply(parent->world, node->matrix, transform->world);
     else
         memcpy(transform->world, node->matrix, sizeof transform->world);
     if (is_new)
@@ -137,6 +154,7 @@ static void transforms_update(ecs_world *world, void *user)
     renderer *r = user;
     for (ecs_iterator it = ecs_iterate(world, r->gpu_world->node); ecs_next(&it);)
         transform_update(r, it.entity);
+    world_deform_update(r);
 }
 
 // ---- The order of instances
@@ -202,12 +220,32 @@ static void box_add_transformed(box *b, const box *from, const float matrix[16])
 
 static const box box_empty = {{FLT_MAX, FLT_MAX, FLT_MAX}, {-FLT_MAX, -FLT_MAX, -FLT_MAX}};
 
+// From the instance's mesh to the world.
+typedef struct placement {
+    const float *world, *previous_world;
+} placement;
+
+bool world_is_skinned(const renderer *r, uint32_t mesh)
+{
+    const uint32_t index = r->gpu_world->mesh_deformations[mesh];
+    return index != SCENE_NONE && r->scene->deformations[index].skin != SCENE_NONE;
+}
+
+static placement placement_of(const renderer *r, const world_instance *instance)
+{
+    static const float identity[16] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
+    if (world_is_skinned(r, instance->mesh))
+        return (placement){identity, identity};
+    const transform_component *transform = ecs_get(r->world, instance->entity, r->gpu_world->transform);
+    return (placement){transform->world, transform->previous_world};
+}
+
 static void box_add_instance(const renderer *r, box *b, const world_instance *instance)
 {
-    const transform_component *transform = ecs_get(r->world, instance->entity, r->gpu_world->transform);
+    const float *world = placement_of(r, instance).world;
     const scene_mesh *mesh = &r->scene->meshes[instance->mesh];
     for (uint32_t i = 0; i < mesh->primitive_count; i++)
-        box_add_transformed(b, &r->gpu_world->primitive_boxes[mesh->first_primitive + i], transform->world);
+        box_add_transformed(b, &r->gpu_world->primitive_boxes[mesh->first_primitive + i], world);
 }
 
 static void instances_order(renderer *r)
@@ -248,7 +286,7 @@ static bool instances_find(renderer *r)
         const uint32_t mesh = ((mesh_component *)it.component)->mesh;
         assert(mesh < w->blas_count);
         const transform_component *transform = ecs_get(r->world, it.entity, w->transform);
-        if (w->blas[mesh].id && transform && matrix_is_invertible(transform->world))
+        if (w->blas[mesh].id && transform && (world_is_skinned(r, mesh) || matrix_is_invertible(transform->world)))
             state->found[count++] = (world_instance){it.entity, mesh};
     }
     const size_t size = count * sizeof *state->found;
@@ -286,15 +324,32 @@ static bool normal_matrix_of(const float world[3][4], float normal[3][4])
     return mirrored;
 }
 
+// What its winding makes of the front becomes its back.
+static void instance_turn(mesh_instance_gpu *instance)
+{
+    instance->mirrored = !instance->mirrored;
+    for (int row = 0; row < 3; row++)
+        glm_vec3_negate(instance->normal_matrix[row]);
+}
+
 static mesh_instance_gpu instance_make(const renderer *r, const world_instance *from)
 {
-    const transform_component *transform = ecs_get(r->world, from->entity, r->gpu_world->transform);
+    const placement placed = placement_of(r, from);
     const scene_mesh *mesh = &r->scene->meshes[from->mesh];
     mesh_instance_gpu instance = {
-        .first_primitive = mesh->first_primitive, .primitive_count = mesh->primitive_count, .mesh = from->mesh};
-    rows_of(transform->world, instance.world);
-    rows_of(transform->previous_world, instance.previous_world);
+        .first_primitive = mesh->first_primitive,
+        .primitive_count = mesh->primitive_count,
+        .mesh = from->mesh,
+        .previous_vertex = PREVIOUS_SAME,
+    };
+    rows_of(placed.world, instance.world);
+    rows_of(placed.previous_world, instance.previous_world);
     instance.mirrored = normal_matrix_of(instance.world, instance.normal_matrix);
+    const world_deformation *deformation = world_deformation_of(r, from->mesh);
+    if (deformation && deformation->changed)
+        instance.previous_vertex = deformation->first_kept;
+    if (deformation && deformation->mirrored)
+        instance_turn(&instance);
     return instance;
 }
 
@@ -313,9 +368,11 @@ static void tlas_instances_write(renderer *r, VkAccelerationStructureInstanceKHR
     }
 }
 
+// Or deformed.
 static bool instance_moved(const mesh_instance_gpu *instance)
 {
-    return memcmp(instance->world, instance->previous_world, sizeof instance->world) != 0;
+    return memcmp(instance->world, instance->previous_world, sizeof instance->world) != 0 ||
+           instance->previous_vertex != PREVIOUS_SAME;
 }
 
 // Fills this frame's instances in; `emitter_moved` is set when one with an emissive material moved. False: no memory.
@@ -404,11 +461,14 @@ static void boxes_move(renderer *r)
     for (uint32_t i = 0; i < w->instance_count; i++) {
         if (!instance_moved(&w->instance_data[i]))
             continue;
-        const transform_component *transform = ecs_get(r->world, w->order[i].entity, w->transform);
+        const float *previous_world = placement_of(r, &w->order[i]).previous_world;
+        const world_deformation *deformation = world_deformation_of(r, w->order[i].mesh);
         const scene_mesh *mesh = &r->scene->meshes[w->order[i].mesh];
         box before = box_empty;
         for (uint32_t k = 0; k < mesh->primitive_count; k++)
-            box_add_transformed(&before, &w->primitive_boxes[mesh->first_primitive + k], transform->previous_world);
+            box_add_transformed(
+                &before, deformation ? &deformation->previous_box : &w->primitive_boxes[mesh->first_primitive + k],
+                previous_world);
         changed_add(w, &before);
         w->state->boxes[i].box = instance_box(r, &w->order[i]);
         changed_add(w, &w->state->boxes[i].box);
@@ -450,11 +510,13 @@ static void world_extract(ecs_world *world, void *user)
     const bool listed = instances_find(r);
     if (listed)
         instances_order(r);
+    world_deform_mark(r);
     bool emitter_moved = listed;
     r->failed |= !instances_write(r, &emitter_moved);
     if (r->failed)
         return;
     boxes_extract(r, listed, last_count);
+    r->gpu_world->changes.instances = listed || r->gpu_world->changes.box_count > 0;
     bounds_extract(r);
     r->failed |= !world_lights_extract(r, emitter_moved);
 }
@@ -472,6 +534,7 @@ static void components_register(renderer *r)
         {&w->transform, {.name = "transform", .size = sizeof(transform_component)}},
         {&w->mesh, {.name = "mesh", .size = sizeof(mesh_component)}},
         {&w->light, {.name = "light", .size = sizeof(light_component)}},
+        {&w->weights, {.name = "weights", .size = sizeof(weights_component), .fini = weights_fini}},
     };
     for (size_t i = 0; i < countof(types); i++)
         *types[i].type = ecs_component_register(r->world, &types[i].desc);
@@ -499,7 +562,7 @@ bool world_init(renderer *r)
     ecs_system_register(r->world, &transforms);
     const ecs_system_desc extract = {.name = "extract", .phase = ECS_PHASE_EXTRACT, .run = world_extract, .user = r};
     ecs_system_register(r->world, &extract);
-    return world_upload(r) && world_lights_init(r) &&
+    return world_upload(r) && world_deform_init(r) && world_lights_init(r) &&
            world_buffer_reserve(r, &w->frame, "frame constants", SCENE_FRAME, sizeof(frame_constants));
 }
 
@@ -509,6 +572,7 @@ void world_fini(renderer *r)
     if (!w)
         return;
     world_lights_fini(r);
+    world_deform_fini(r);
     const gpu_buffer buffers[] = {w->frame,      w->positions, w->attributes,    w->indices,
                                   w->primitives, w->instances, w->materials,     w->lights,
                                   w->emitters,   w->light_cdf, w->tlas_instances};
@@ -521,6 +585,7 @@ void world_fini(renderer *r)
     free(w->blas);
     free(w->textures);
     free(w->primitive_boxes);
+    free(w->node_entities);
     free(w->order);
     free(w->instance_data);
     free(w->state->listed);

@@ -24,6 +24,12 @@ typedef struct light_component { // "light": a punctual light at the entity's tr
     float inner_cone, outer_cone; // radians
 } light_component;
 
+// "weights": of the morph targets of the node's mesh; on each node whose mesh has any
+typedef struct weights_component {
+    float *weights; // [count]; owned by the component
+    uint32_t count;
+} weights_component;
+
 typedef struct box {
     float min[3], max[3]; // min > max: empty
 } box;
@@ -38,11 +44,28 @@ typedef struct world_source {
     float power; // as world_element_power, their sum
 } world_source;
 
-// What is not as it was in the last frame; all of it in the first. Geometry, materials and textures never change.
+// A mesh that deforms, in this frame. What follows its vertices (the pass "deform", acceleration structures, Embree)
+// keeps the version that it has followed to.
+typedef struct world_deformation {
+    uint32_t version; // changes of its vertices so far; 0: they are at rest
+    bool changed; // the vertices are others than in the last frame
+    bool drawn; // an instance of this frame has the mesh; of a level that has none, vertices and trees stay behind
+    bool mirrored; // turned inside out: most of its joints' determinants are negative
+    float scale; // mean of its joints': what they make of a length of 1
+    bool stretched; // so far from rest that a tree over the triangles at rest is worth no keeping
+    box box, previous_box; // mesh space, around all its vertices, in this frame and the last
+    uint32_t first_kept; // number of its first vertex among those of all deformations
+    const float (*joints)[3][4]; // [skin's joint_count]: rows, from the mesh at rest to the world
+    const float *weights; // [target_count]
+} world_deformation;
+
+// What is not as it was in the last frame; all of it in the first. Materials and textures never change, nor does
+// geometry but by deformations.
 typedef struct world_changes {
+    bool instances; // one moved, deformed, or is listed at another place
     bool bounds; // the constants' scene_min, scene_max and scene_radius
     bool sources; // one changed, came, went or was numbered anew
-    const box *boxes; // world: what the instances that moved, came or went cover, and what they covered
+    const box *boxes; // world: what the instances that moved, deformed, came or went cover, and what they covered
     uint32_t box_count;
 } world_changes;
 
@@ -53,11 +76,12 @@ typedef struct world_instance {
 } world_instance;
 
 typedef struct world_gpu {
-    component_type node, transform, mesh, light;
+    component_type node, transform, mesh, light, weights;
+    entity *node_entities; // [node_count]: what the scene's nodes were spawned as
     // Where the device is a CPU, `positions` and `indices` are mapped, for Embree.
     gpu_buffer frame, positions, attributes, indices, primitives, instances, materials, lights, emitters, light_cdf;
     gpu_buffer tlas_instances; // VkAccelerationStructureInstanceKHR[instance_count], host
-    gpu_acceleration *blas; // per mesh; {0} for meshes without triangles
+    gpu_acceleration *blas; // per mesh, at rest at first; {0} for meshes without triangles
     uint32_t blas_count;
     gpu_image *textures; // one per image and colour space
     uint32_t texture_count;
@@ -70,9 +94,14 @@ typedef struct world_gpu {
 
     // What the CPU knows of the scene. Instances are ordered by recursive median split over their centres, for drivers
     // that build BVHs by halving the list as given; the order changes only when meshes come or go.
-    box *primitive_boxes; // mesh space, per primitive
+    box *primitive_boxes; // mesh space, per primitive; of deforming meshes the whole mesh's
     world_instance *order; // instance_count, in the order of the TLAS
     mesh_instance_gpu *instance_data; // the same order
+    world_deformation *deformations; // parallel to the scene's
+    uint32_t *mesh_deformations; // per mesh: index, or SCENE_NONE
+    uint32_t kept_vertices; // of all deformations
+    gpu_buffer previous_positions; // vec3[kept_vertices]: of last frame, where `changed`
+    struct deformation_state *deformation_states; // private to world_deform.c
     struct world_state *state; // private to world.c
     struct world_lights *light_state; // private to world_lights.c
 } world_gpu;
@@ -87,10 +116,29 @@ entity world_sun_add(renderer *r, const float direction[3], float lux);
 // Luminous flux of a light source's element, as `light_power`.
 float world_element_power(const renderer *r, uint32_t element);
 
+// The mesh's deformation in this frame; NULL: it has none.
+const world_deformation *world_deformation_of(const renderer *r, uint32_t mesh);
+// Where this frame's joints and targets put a vertex of the scene that is the deformation's, mesh space: what the GPU
+// computes, but for rounding.
+void world_deformed_position(const renderer *r, uint32_t deformation, uint32_t vertex, float position[3]);
+// A skinned mesh stays where its joints put it: its node does not move it (glTF 2.0, section 3.7.3.3).
+bool world_is_skinned(const renderer *r, uint32_t mesh);
+// Triangles of a mesh, a geometry a primitive, for acceleration structures over `positions`, those of the scene's
+// vertex 0, `stride` bytes apart. `geometries` has room for its primitives.
+void world_mesh_triangles(const renderer *r, uint32_t mesh, VkDeviceAddress positions, uint32_t stride,
+                          gpu_triangles *geometries);
+
 // ---- Between the world's files.
 bool world_upload(renderer *r); // world_upload.c: what never changes
+void world_matrix_multiply(const float a[16], const float b[16], float product[16]); // `product` may be either
+// world_deform.c: after the upload; after the transforms; once the instances are ordered; the last accepts a world half
+// made.
+bool world_deform_init(renderer *r);
+void world_deform_update(renderer *r);
+void world_deform_mark(renderer *r); // which deformations are drawn
+void world_deform_fini(renderer *r);
 // world_lights.c: punctual lights, emissive triangles and the choice among them. Emitters are gathered anew when
-// `moved`, that is when an instance with an emissive material moved, or any instance came or went.
+// `moved`, that is when an instance with an emissive material moved or deformed, or any instance came or went.
 bool world_lights_init(renderer *r);
 bool world_lights_extract(renderer *r, bool moved);
 void world_lights_fini(renderer *r);

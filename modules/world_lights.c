@@ -122,13 +122,27 @@ static void point_to_world(const mesh_instance_gpu *instance, const float p[3], 
     }
 }
 
+// Mesh space, in this frame.
+static void vertex_position(const renderer *r, uint32_t mesh, uint32_t vertex, float position[3])
+{
+    const uint32_t deformation = r->gpu_world->mesh_deformations[mesh];
+    if (deformation == SCENE_NONE)
+        memcpy(position, r->scene->positions[vertex], 3 * sizeof(float));
+    else
+        world_deformed_position(r, deformation, vertex, position);
+}
+
 // Everything but the emission and the probability. False for a triangle without area.
-static bool emitter_place(const scene_data *s, const mesh_instance_gpu *instance, const mesh_primitive *p,
+static bool emitter_place(const renderer *r, const mesh_instance_gpu *instance, const mesh_primitive *p,
                           const uint32_t vertices[3], emissive_triangle *emitter)
 {
+    const scene_data *s = r->scene;
     float corners[3][3], cross[3];
-    for (int k = 0; k < 3; k++)
-        point_to_world(instance, s->positions[vertices[k]], corners[k]);
+    for (int k = 0; k < 3; k++) {
+        float position[3];
+        vertex_position(r, instance->mesh, vertices[k], position);
+        point_to_world(instance, position, corners[k]);
+    }
     memcpy(emitter->corner, corners[0], sizeof emitter->corner);
     glm_vec3_sub(corners[1], corners[0], emitter->edge1);
     glm_vec3_sub(corners[2], corners[0], emitter->edge2);
@@ -165,7 +179,7 @@ static uint32_t emitters_append(const renderer *r, uint32_t index, uint32_t geom
         uint32_t vertices[3];
         triangle_vertices(s, p, t, vertices);
         memcpy(emitter.emission, means ? means[t] : s->materials[p->material].emissive, sizeof emitter.emission);
-        if (!(luminance(emitter.emission) > 0) || !emitter_place(s, instance, p, vertices, &emitter))
+        if (!(luminance(emitter.emission) > 0) || !emitter_place(r, instance, p, vertices, &emitter))
             continue;
         powers[count] = GLM_PIf * luminance(emitter.emission) * emitter.area * (emitter.two_sided ? 2 : 1);
         emitters[count++] = emitter;

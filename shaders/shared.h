@@ -37,6 +37,7 @@ typedef uint32_t uint;
 #define SCENE_LIGHTS 7     // punctual_light
 #define SCENE_EMITTERS 8   // emissive_triangle
 #define SCENE_LIGHT_CDF 9  // float per light source: inclusive sums of the choice probabilities, last is 1
+#define SCENE_PREVIOUS_POSITIONS 10 // vec3 per vertex of a deforming mesh: where it was in the last frame
 #define SCENE_TEXTURES 12
 
 SHARED_STRUCT(frame_constants) {
@@ -86,7 +87,9 @@ SHARED_STRUCT(mesh_instance_gpu) {
     uint first_primitive, primitive_count;
     uint mirrored;                  // 1: the determinant is negative
     uint mesh;
-} SHARED_END(mesh_instance_gpu, 160)
+    uint previous_vertex;           // its first vertex in the previous positions; PREVIOUS_SAME: they are as they were
+} SHARED_END(mesh_instance_gpu, 164)
+#define PREVIOUS_SAME 0xffffffffu
 
 #define TEXTURE_NONE 0xffffffffu
 SHARED_STRUCT(texture_reference) {
@@ -137,6 +140,45 @@ SHARED_STRUCT(emissive_triangle) {
     uint geometry;
     uint triangle;
 } SHARED_END(emissive_triangle, 112)
+
+// ---- Deformation of vertices (modules/deform.h)
+
+#define DEFORM_INFLUENCES 8
+SHARED_STRUCT(deform_vertex) { // at rest, mesh space
+    SHARED_VEC3(position);
+    SHARED_VEC3(normal);
+    SHARED_VEC4(tangent); // w: 0: none
+} SHARED_END(deform_vertex, 40)
+
+SHARED_STRUCT(deform_influences) {
+    uint joints[DEFORM_INFLUENCES / 2]; // pairs of 16 bits, the first is the lower half
+    float weights[DEFORM_INFLUENCES];   // sum 1
+} SHARED_END(deform_influences, 48)
+
+SHARED_STRUCT(deform_offset) { // that a morph target of weight 1 adds
+    SHARED_VEC3(position);
+    SHARED_VEC3(normal);
+    SHARED_VEC3(tangent);
+} SHARED_END(deform_offset, 36)
+
+SHARED_STRUCT(deform_joint) { // rows of the matrix from the mesh at rest to the world
+    SHARED_VEC4(rows[3]);
+} SHARED_END(deform_joint, 48)
+
+SHARED_STRUCT(deform_target) { // a morph target in use
+    uint first_offset; // of its vertices, index into the offsets
+    float weight;
+} SHARED_END(deform_target, 8)
+
+SHARED_STRUCT(deform_range) { // the vertices of one mesh
+    uint vertex_count;
+    uint first_vertex;    // in the scene's positions and attributes
+    uint first_kept;      // in the vertices at rest and the previous positions
+    uint first_influence; // of the first vertex
+    uint first_joint;
+    uint is_skinned;
+    uint first_target, target_count;
+} SHARED_END(deform_range, 32)
 
 // ---- Passes over pixels
 

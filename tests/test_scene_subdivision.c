@@ -146,7 +146,7 @@ TEST(what_is_no_quad_stays_two_triangles)
 
 // ---- Refused
 
-static void check_refused(const cube_bytes *cube, uint32_t triangles, const char *extras, const char *reason)
+static void check_drawn_as_it_is(const cube_bytes *cube, uint32_t triangles, const char *extras, const char *reason)
 {
     scene_data *const scene = cube_load(cube, triangles, extras, "");
     CHECK(scene && scene->subdivision_count == 0 && scene->mesh_count == 1 && scene->index_count >= 36);
@@ -162,7 +162,7 @@ TEST(a_non_manifold_cage_is_refused_by_name_and_drawn_as_it_is)
 {
     cube_bytes cube = cube_bytes_make();
     memcpy(cube.indices + 36, (uint16_t[]){0, 1, 22}, 6); // a third face on the edge between vertices 0 and 1
-    check_refused(&cube, 13, CATMARK, "more than two faces");
+    check_drawn_as_it_is(&cube, 13, CATMARK, "more than two faces");
 }
 
 TEST(faces_that_do_not_face_the_same_way_are_refused)
@@ -173,14 +173,14 @@ TEST(faces_that_do_not_face_the_same_way_are_refused)
         cube.indices[i + 1] = cube.indices[i + 2];
         cube.indices[i + 2] = second;
     }
-    check_refused(&cube, 12, CATMARK, "do not face the same way");
+    check_drawn_as_it_is(&cube, 12, CATMARK, "do not face the same way");
 }
 
 TEST(a_triangle_without_area_is_refused)
 {
     cube_bytes cube = cube_bytes_make();
     memcpy(cube.indices + 36, (uint16_t[]){0, 1, 1}, 6);
-    check_refused(&cube, 13, CATMARK, "triangle 12 of its primitive 0 has no area");
+    check_drawn_as_it_is(&cube, 13, CATMARK, "triangle 12 of its primitive 0 has no area");
 }
 
 TEST(bad_extras_name_the_mesh_the_key_and_what_was_expected)
@@ -204,7 +204,7 @@ TEST(bad_extras_name_the_mesh_the_key_and_what_was_expected)
     for (size_t i = 0; i < countof(cases); i++) {
         char extras[256];
         snprintf(extras, sizeof(extras), "{'lanternfield_subdivision':%s}", cases[i].extras);
-        check_refused(&cube, 12, extras, cases[i].reason);
+        check_drawn_as_it_is(&cube, 12, extras, cases[i].reason);
     }
 }
 
