@@ -469,6 +469,24 @@ TEST(seams_of_values_are_kept)
     }
 }
 
+TEST(values_without_seams_go_to_their_limit)
+{
+    cage c = bent_cube_make();
+    c.corner_values = c.corners;
+    for (const point &p : c.positions) {
+        c.values.push_back({p.p[0], p.p[1], p.p[2]});
+    }
+    const refined r(c, 3);
+    for (const subdivision_level &level : r.result.levels) {
+        for (uint32_t i = 0; i < level.vertex_count; i++) {
+            point at[3];
+            r.evaluate(c, level.vertices[i].stencil, at);
+            const float *const value = r.result.values[level.vertices[i].value];
+            CHECK_NEAR(distance(at[0], {{value[0], value[1], value[2]}}), 0, 1e-5);
+        }
+    }
+}
+
 TEST(a_level_has_the_vertices_of_the_one_before)
 {
     cage c = bent_cube_make();
@@ -546,6 +564,7 @@ int main()
     RUN(a_finite_crease_rounds_the_edge_a_little);
     RUN(boundaries_are_interpolated_by_their_rule);
     RUN(seams_of_values_are_kept);
+    RUN(values_without_seams_go_to_their_limit);
     RUN(a_level_has_the_vertices_of_the_one_before);
     RUN(triangles_face_as_the_cage_does);
     RUN(faces_that_meet_in_a_vertex_alone_are_refused);
