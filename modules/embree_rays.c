@@ -113,11 +113,14 @@ static RTCGeometry geometry_create(embree_rays *rays, const mesh_primitive *p)
 }
 
 // Geometries count as primitives do within their mesh; those without triangles leave a gap. What deforms has a tree
-// whose boxes can be fitted to other positions, which Embree makes in scenes of low quality alone.
+// whose boxes can be fitted to other positions, which Embree makes in dynamic scenes of low quality alone.
 static RTCScene mesh_create(embree_rays *rays, const scene_mesh *mesh, bool deforms)
 {
     RTCScene scene = rtcNewScene(rays->device);
-    rtcSetSceneBuildQuality(scene, deforms ? RTC_BUILD_QUALITY_LOW : RTC_BUILD_QUALITY_MEDIUM);
+    if (deforms) {
+        rtcSetSceneBuildQuality(scene, RTC_BUILD_QUALITY_LOW);
+        rtcSetSceneFlags(scene, RTC_SCENE_FLAG_DYNAMIC);
+    }
     for (uint32_t i = 0; i < mesh->primitive_count; i++) {
         const mesh_primitive *p = &rays->scene->primitives[mesh->first_primitive + i];
         if (p->index_count < 3)

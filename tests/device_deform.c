@@ -1,12 +1,14 @@
 // Deforming meshes: vertices, motion, rays and what is traced again, against evaluations of the test's own.
 //
 //     device_deform                    the tests
-//     device_deform bench              what deforming, updates, rebuilds and rays cost, by size of the mesh
-#include "engine/gpu_internal.h"
+//     device_deform bench              milliseconds of deforming, of keeping up the structures, and of rays
+#include "modules/image_file.h"
 #include "modules/vpl_trace.h"
 #include "quad_scene.h"
 #include "ray_batch.h"
 #include "test.h"
+
+#include <unistd.h>
 
 static gpu *devices[2]; // a device holds one scene
 #define device devices[0]
@@ -301,7 +303,8 @@ static void pose_set(renderer *r, float time, float size)
     }
     for (uint32_t t = 0; t < TARGETS; t++) {
         weights_of(r, SKINNED_NODE)[t] = size * sinf(time + (float)t);
-        weights_of(r, MORPHED_NODE)[t] = size * cosf(time + (float)t);
+        if (r->scene->deformation_count > 1)
+            weights_of(r, MORPHED_NODE)[t] = size * cosf(time + (float)t);
     }
 }
 
@@ -330,20 +333,26 @@ static void multiply(const double a[16], const double b[16], double out[16])
         }
 }
 
-// From the mesh at rest to the world, in double.
-static void joint_matrix(const deform_scene *s, renderer *r, uint32_t joint, double out[16])
+static void node_world(renderer *r, uint32_t node, double out[16])
 {
-    double world[16], local[16], inverse_bind[16];
-    for (int k = 0; k < 16; k++) {
-        world[k] = (double)matrix_of(r, FIRST_JOINT)[k];
-        local[k] = (double)matrix_of(r, FIRST_JOINT + joint)[k];
-        inverse_bind[k] = (double)s->inverse_bind[joint][k];
+    double local[16], parent[16];
+    for (int k = 0; k < 16; k++)
+        local[k] = (double)matrix_of(r, node)[k];
+    if (r->scene->nodes[node].parent == SCENE_NONE) {
+        memcpy(out, local, sizeof local);
+        return;
     }
-    if (joint > 0) {
-        double product[16];
-        multiply(world, local, product);
-        memcpy(world, product, sizeof world);
-    }
+    node_world(r, r->scene->nodes[node].parent, parent);
+    multiply(parent, local, out);
+}
+
+// From the mesh at rest to the world.
+static void joint_matrix(renderer *r, const scene_skin *skin, uint32_t joint, double out[16])
+{
+    double world[16], inverse_bind[16];
+    node_world(r, skin->joints[joint], world);
+    for (int k = 0; k < 16; k++)
+        inverse_bind[k] = (double)skin->inverse_bind[joint][k];
     multiply(world, inverse_bind, out);
 }
 
@@ -351,17 +360,16 @@ typedef struct vertex_pose {
     vector position, normal, tangent;
 } vertex_pose;
 
-static vertex_pose morphed_vertex(const deform_scene *s, renderer *r, uint32_t deformation, uint32_t vertex)
+static vertex_pose morphed_vertex(renderer *r, const scene_deformation *d, uint32_t vertex)
 {
-    const scene_deformation *d = &s->deformations[deformation];
-    const vertex_attributes *a = &s->data.attributes[d->first_vertex + vertex];
+    const vertex_attributes *a = &r->scene->attributes[d->first_vertex + vertex];
     vertex_pose p;
     for (int k = 0; k < 3; k++) {
-        p.position.x[k] = (double)s->data.positions[d->first_vertex + vertex][k];
+        p.position.x[k] = (double)r->scene->positions[d->first_vertex + vertex][k];
         p.normal.x[k] = (double)a->normal[k];
         p.tangent.x[k] = (double)a->tangent[k];
-        for (uint32_t t = 0; t < TARGETS; t++) {
-            const scene_morph *offset = &s->morphs[t * s->vertices + vertex];
+        for (uint32_t t = 0; t < d->target_count; t++) {
+            const scene_morph *offset = &d->morphs[t * d->vertex_count + vertex];
             const double weight = (double)weights_of(r, d->node)[t];
             p.position.x[k] += weight * (double)offset->position[k];
             p.normal.x[k] += weight * (double)offset->normal[k];
@@ -371,16 +379,13 @@ static vertex_pose morphed_vertex(const deform_scene *s, renderer *r, uint32_t d
     return p;
 }
 
-static vertex_pose skinned_vertex(const deform_scene *s, renderer *r, uint32_t vertex, vertex_pose p)
+// Normals by the inverse transpose. `joints`: of the skin.
+static vertex_pose skinned_vertex(const scene_influences *by, const double (*joints)[16], vertex_pose p)
 {
-    double m[16] = {0}, inverse[3][3];
-    for (int i = 0; i < SCENE_INFLUENCES; i++) {
-        double joint[16];
-        joint_matrix(s, r, s->influences[vertex].joints[i], joint);
+    double m[16] = {0}, inverse[3][3], determinant = 0;
+    for (int i = 0; i < SCENE_INFLUENCES; i++)
         for (int k = 0; k < 16; k++)
-            m[k] += (double)s->influences[vertex].weights[i] * joint[k];
-    }
-    double determinant = 0;
+            m[k] += (double)by->weights[i] * joints[by->joints[i]][k];
     for (int i = 0; i < 3; i++) {
         for (int k = 0; k < 3; k++) { // inverse[k][i]: cofactor of row i, column k
             const int i1 = (i + 1) % 3, i2 = (i + 2) % 3, k1 = (k + 1) % 3, k2 = (k + 2) % 3;
@@ -401,17 +406,32 @@ static vertex_pose skinned_vertex(const deform_scene *s, renderer *r, uint32_t v
     return out;
 }
 
-static vertex_pose vertex_expected(const deform_scene *s, renderer *r, uint32_t deformation, uint32_t vertex)
+static vertex_pose vertex_expected(renderer *r, const scene_deformation *d, uint32_t vertex, const double (*joints)[16])
 {
-    vertex_pose p = morphed_vertex(s, r, deformation, vertex);
-    if (deformation == 0)
-        p = skinned_vertex(s, r, vertex, p);
+    vertex_pose p = morphed_vertex(r, d, vertex);
+    if (d->skin != SCENE_NONE)
+        p = skinned_vertex(&d->influences[vertex], joints, p);
     p.normal = normalized(p.normal);
     const double along = dot(p.normal, p.tangent);
     for (int k = 0; k < 3; k++)
         p.tangent.x[k] -= along * p.normal.x[k];
-    p.tangent = normalized(p.tangent);
+    const bool is_parallel = dot(p.tangent, p.tangent) < 1e-6; // as some files have it
+    p.tangent = is_parallel ? (vector){{NAN, NAN, NAN}} : normalized(p.tangent);
     return p;
+}
+
+// What every vertex of the deformation should be; free() it.
+static vertex_pose *pose_expected(renderer *r, const scene_deformation *d)
+{
+    vertex_pose *poses = memory_alloc(d->vertex_count * sizeof *poses);
+    const scene_skin *skin = d->skin == SCENE_NONE ? NULL : &r->scene->skins[d->skin];
+    double(*joints)[16] = memory_alloc((skin ? skin->joint_count : 1) * sizeof *joints);
+    for (uint32_t i = 0; skin && i < skin->joint_count; i++)
+        joint_matrix(r, skin, i, joints[i]);
+    for (uint32_t v = 0; v < d->vertex_count; v++)
+        poses[v] = vertex_expected(r, d, v, (const double(*)[16])joints);
+    free(joints);
+    return poses;
 }
 
 // ---- Vertices
@@ -454,27 +474,34 @@ static void vertex_compare(vertex_errors *e, const float position[3], const vert
     const vector t = {{(double)a->tangent[0], (double)a->tangent[1], (double)a->tangent[2]}};
     e->position = fmax(e->position, distance(position, expected->position));
     e->normal = fmax(e->normal, distance(a->normal, expected->normal));
-    e->tangent = fmax(e->tangent, distance(a->tangent, expected->tangent));
-    e->length = fmax(e->length, fmax(fabs(dot(n, n) - 1), fabs(dot(t, t) - 1)));
-    e->angle = fmax(e->angle, fabs(dot(n, t)));
+    e->length = fmax(e->length, fabs(dot(n, n) - 1));
     for (int k = 0; k < 3; k++)
         e->outside += position[k] < bounds->min[k] || position[k] > bounds->max[k];
+    if (a->tangent[3] == 0 || isnan(expected->tangent.x[0]))
+        return;
+    e->tangent = fmax(e->tangent, distance(a->tangent, expected->tangent));
+    e->length = fmax(e->length, fabs(dot(t, t) - 1));
+    e->angle = fmax(e->angle, fabs(dot(n, t)));
 }
 
-static void check_vertices(const deform_scene *s, renderer *r)
+// Of the vertices of all deformations; what is none of theirs should be as it was. `size`: of the scene, metres.
+static void check_vertices(renderer *r, double size)
 {
+    const scene_data *s = r->scene;
     vertices v = vertices_read(r);
     vertex_errors e = {0};
-    for (uint32_t d = 0; d < 2; d++)
-        for (uint32_t i = 0; i < s->vertices; i++) {
-            const uint32_t vertex = s->deformations[d].first_vertex + i;
-            const vertex_pose expected = vertex_expected(s, r, d, i);
-            vertex_compare(&e, v.positions[vertex], &v.attributes[vertex], &expected,
-                           &r->gpu_world->deformations[d].box);
-            CHECK(memcmp(v.attributes[vertex].uv0, s->data.attributes[vertex].uv0, 24) == 0); // and what follows
+    for (uint32_t i = 0; i < s->deformation_count; i++) {
+        const scene_deformation *d = &s->deformations[i];
+        vertex_pose *expected = pose_expected(r, d);
+        for (uint32_t k = 0; k < d->vertex_count; k++) {
+            const uint32_t vertex = d->first_vertex + k;
+            vertex_compare(&e, v.positions[vertex], &v.attributes[vertex], &expected[k],
+                           &r->gpu_world->deformations[i].box);
+            CHECK(memcmp(v.attributes[vertex].uv0, s->attributes[vertex].uv0, 24) == 0); // and what follows
         }
-    CHECK(memcmp(v.positions, s->data.positions, 4 * sizeof *v.positions) == 0); // the floor
-    CHECK(e.position < 1e-5 && e.normal < 1e-5 && e.tangent < 1e-5);
+        free(expected);
+    }
+    CHECK(e.position < 1e-5 * size && e.normal < 1e-5 && e.tangent < 1e-5);
     CHECK(e.length < 1e-6 && e.angle < 1e-6);
     CHECK(e.outside == 0);
     vertices_free(&v);
@@ -489,7 +516,7 @@ TEST(vertices_are_what_joints_and_targets_make_of_them)
         for (uint32_t frame = 0; frame < 4; frame++) {
             pose_set(r, 0.9f * (float)frame, 1);
             CHECK(renderer_frame(r) && pass_ran(r, "deform"));
-            check_vertices(s, r);
+            check_vertices(r, 1);
         }
         renderer_destroy(r);
         scene_free(s);
@@ -741,7 +768,7 @@ TEST(every_tracer_hits_the_deformed_triangles)
     ray *rays = memory_alloc(RAYS * sizeof *rays);
     uint32_t deforming = 0;
     for (uint32_t frame = 0; frame < FRAMES; frame++) {
-        pose_set(r, 0.5f * (float)frame, 0.4f);
+        pose_set(r, 0.5f * (float)frame, 0.2f);
         const bool far = frame % 8 >= 6; // and back again
         matrix_of(r, FIRST_JOINT + 1)[12] = far ? 5 + 3 * (float)(frame % 8) : 0.25f;
         check_rays(r, tracers[frame % 3], rays, rays_make(rays, RAYS), &deforming);
@@ -815,6 +842,7 @@ TEST(emissive_triangles_lie_on_the_deformed_ones)
         CHECK(r->constants.emitter_count == s->primitives[1].index_count / 3);
         const emissive_triangle *emitters = gpu_buffer_map(device, r->gpu_world->emitters);
         double worst = 0;
+        vertex_pose *expected = pose_expected(r, &s->deformations[0]);
         for (uint32_t i = 0; i < r->constants.emitter_count; i++)
             for (uint32_t k = 0; k < 3; k++) {
                 const float *edges[3] = {(float[3]){0}, emitters[i].edge1, emitters[i].edge2};
@@ -822,12 +850,93 @@ TEST(emissive_triangles_lie_on_the_deformed_ones)
                 for (int axis = 0; axis < 3; axis++)
                     corner[axis] = emitters[i].corner[axis] + edges[k][axis];
                 const uint32_t vertex = s->data.indices[6 + 3 * emitters[i].triangle + k];
-                worst = fmax(worst, distance(corner, vertex_expected(s, r, 0, vertex).position));
+                worst = fmax(worst, distance(corner, expected[vertex].position));
             }
         CHECK(worst < 1e-5);
+        free(expected);
     }
     renderer_destroy(r);
     scene_free(s);
+}
+
+// ---- Models
+
+// Of each channel the last key up to `time`, in seconds.
+static void clip_pose(renderer *r, const scene_animation *clip, float time)
+{
+    const scene_data *s = r->scene;
+    scene_node *nodes = memory_alloc(s->node_count * sizeof *nodes);
+    memcpy(nodes, s->nodes, s->node_count * sizeof *nodes);
+    for (uint32_t i = 0; i < clip->channel_count; i++) {
+        const scene_channel *c = &clip->channels[i];
+        uint32_t key = 0;
+        while (key + 1 < c->key_count && c->times[key + 1] <= time)
+            key++;
+        const float *value = c->values + (c->interpolation == SCENE_CUBIC ? 3 * key + 1 : key) * c->width;
+        if (c->target > SCENE_WEIGHTS)
+            continue;
+        scene_node *node = &nodes[c->index];
+        float *const to[] = {[SCENE_TRANSLATION] = node->translation,
+                             [SCENE_ROTATION] = node->rotation,
+                             [SCENE_SCALE] = node->scale,
+                             [SCENE_WEIGHTS] = c->target == SCENE_WEIGHTS ? weights_of(r, c->index) : NULL};
+        memcpy(to[c->target], value, c->width * sizeof(float));
+        if (c->target != SCENE_WEIGHTS)
+            scene_matrix_compose(node->translation, node->rotation, node->scale, matrix_of(r, c->index));
+    }
+    free(nodes);
+}
+
+static void picture_write(renderer *r, const char *model, uint32_t number)
+{
+    const uint32_t width = r->settings.width, height = r->settings.height;
+    uint8_t *texels = memory_alloc(4 * width * height);
+    CHECK(gpu_image_read(r->gpu, frame_graph_find_image(r->graph, "display"), VK_IMAGE_LAYOUT_TRANSFER_SRC_OPTIMAL,
+                         texels, 4 * width * height));
+    char path[256];
+    snprintf(path, sizeof path, BUILD_DIR "/deform_%s_%u.png", model, number);
+    CHECK(image_write_png(path, texels, width, height, 4));
+    free(texels);
+}
+
+static void check_model(const char *model)
+{
+    char path[256];
+    snprintf(path, sizeof path, "../shared/scenes/animated/%s/%s.gltf", model, model);
+    if (access(path, R_OK) != 0) {
+        printf("  skipped: no %s\n", path);
+        return;
+    }
+    scene_data *scene = scene_load(path);
+    CHECK(scene && scene->deformation_count > 0);
+    render_settings settings = render_settings_default();
+    settings.width = settings.height = 240;
+    settings.vpls = 3000;
+    renderer *r = renderer_of(device, scene, settings);
+    world_sun_add(r, (float[3]){-0.5f, -1, -0.6f}, 10);
+    const float diagonal[3] = {scene->bounds_max[0] - scene->bounds_min[0], scene->bounds_max[1] - scene->bounds_min[1],
+                               scene->bounds_max[2] - scene->bounds_min[2]};
+    static const float times[] = {0, 0.3f, 1}; // of the clip's duration
+    uint32_t changes = 0;
+    for (uint32_t i = 0; i < countof(times); i++) {
+        clip_pose(r, &scene->animations[0], times[i] * scene->animations[0].duration);
+        CHECK(renderer_frame(r));
+        changes += i > 0 && pass_ran(r, "deform");
+        check_vertices(r, fmax(1, (double)(diagonal[0] + diagonal[1] + diagonal[2])));
+        CHECK(!r->gpu_world->deformations[0].stretched);
+        picture_write(r, model, i);
+    }
+    CHECK(changes > 0);
+    renderer_destroy(r);
+    scene_destroy(scene);
+}
+
+TEST(models_take_the_poses_of_their_clips)
+{
+    static const char *const models[] = {"CesiumMan",      "Fox", "RiggedFigure", "RiggedSimple", "AnimatedMorphCube",
+                                         "MorphStressTest"};
+    for (size_t i = 0; i < countof(models); i++)
+        check_model(models[i]);
 }
 
 TEST(the_validation_layer_has_nothing_to_say)
@@ -836,8 +945,111 @@ TEST(the_validation_layer_has_nothing_to_say)
         CHECK(gpu_validation_messages(devices[i]) == 0);
 }
 
-int main(void)
+// ---- Bench
+
+enum { BENCH_RAYS = 200000, BENCH_FRAMES = 24 };
+
+// From around the scene to its deformed meshes.
+static void bench_rays_make(const renderer *r, ray *rays)
 {
+    const box *b = &r->gpu_world->deformations[0].box;
+    for (uint32_t i = 0; i < BENCH_RAYS; i++) {
+        float size = 0, length = 0;
+        for (int k = 0; k < 3; k++)
+            size += b->max[k] - b->min[k];
+        for (int k = 0; k < 3; k++) {
+            const float to = b->min[k] + random_unit() * (b->max[k] - b->min[k]);
+            rays[i].origin[k] = 0.5f * (b->min[k] + b->max[k]) + size * random_signed();
+            rays[i].direction[k] = to - rays[i].origin[k];
+            length += rays[i].direction[k] * rays[i].direction[k];
+        }
+        for (int k = 0; k < 3; k++)
+            rays[i].direction[k] /= sqrtf(length);
+        rays[i].reach = 1e30f;
+    }
+}
+
+static int double_compare(const void *a, const void *b)
+{
+    const double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+static double pass_time(const renderer *r, const char *name)
+{
+    uint32_t count;
+    const frame_graph_timing *timings = frame_graph_timings(r->graph, &count);
+    for (uint32_t i = 0; i < count; i++)
+        if (strcmp(timings[i].name, name) == 0)
+            return timings[i].milliseconds;
+    return 0;
+}
+
+static double median(double times[BENCH_FRAMES])
+{
+    qsort(times, BENCH_FRAMES, sizeof *times, double_compare);
+    return times[BENCH_FRAMES / 2];
+}
+
+// Medians over the frames of a clip, or of poses of the grid where there is none.
+static void bench(const char *name, const scene_data *scene)
+{
+    static const char *const passes[] = {"deform", "acceleration/update", "acceleration", "rays/scene", "near/trace"};
+    static const uint32_t tracers[] = {RAYS_QUERY, RAYS_EMBREE};
+    renderer *r = renderer_of(device, scene, settings_small());
+    batch_add(r);
+    ray *rays = memory_alloc(BENCH_RAYS * sizeof *rays);
+    for (size_t t = 0; t < countof(tracers); t++) {
+        double times[countof(passes)][BENCH_FRAMES];
+        uint32_t stretched = 0;
+        for (uint32_t frame = 0; frame < BENCH_FRAMES; frame++) {
+            if (scene->animation_count > 0)
+                clip_pose(r, &scene->animations[0], (float)frame / BENCH_FRAMES * scene->animations[0].duration);
+            else
+                pose_set(r, 0.3f * (float)frame, 0.5f);
+            random_state = 1;
+            bench_rays_make(r, rays);
+            answers a = trace(r, tracers[t], rays, BENCH_RAYS);
+            answers_free(&a);
+            for (size_t p = 0; p < countof(passes); p++)
+                times[p][frame] = pass_time(r, passes[p]);
+            stretched += r->gpu_world->deformations[0].stretched;
+        }
+        printf("%-12s %s, %2u of %u poses stretched:", name, tracers[t] == RAYS_QUERY ? "query " : "embree", stretched,
+               BENCH_FRAMES);
+        for (size_t p = 0; p < countof(passes); p++)
+            printf(" %s %.2f", passes[p], median(times[p]));
+        printf(" ms\n");
+    }
+    free(rays);
+    renderer_destroy(r);
+}
+
+static int bench_all(void)
+{
+    static const char *const models[] = {"CesiumMan", "Fox"};
+    devices[0] = gpu_create(&(gpu_desc){0});
+    for (size_t i = 0; i < countof(models); i++) {
+        char path[256];
+        snprintf(path, sizeof path, "../shared/scenes/animated/%s/%s.gltf", models[i], models[i]);
+        scene_data *scene = scene_load(path);
+        if (scene)
+            bench(models[i], scene);
+        scene_destroy(scene);
+    }
+    deform_scene *s = scene_create((grid_desc){.cells = 224, .influences = 2});
+    s->data.deformation_count = 1;
+    s->nodes[MORPHED_NODE].mesh = SCENE_NONE;
+    bench("100K grid", &s->data);
+    scene_free(s);
+    gpu_destroy(device);
+    return EXIT_SUCCESS;
+}
+
+int main(int argc, char **argv)
+{
+    if (argc > 1 && strcmp(argv[1], "bench") == 0)
+        return bench_all();
     for (int i = 0; i < 2; i++)
         devices[i] = gpu_create(&(gpu_desc){.validation = true});
     if (!devices[0] || !devices[1]) {
@@ -851,6 +1063,7 @@ int main(void)
     RUN(every_tracer_hits_the_deformed_triangles);
     RUN(light_paths_that_a_deforming_mesh_meets_are_traced_again);
     RUN(emissive_triangles_lie_on_the_deformed_ones);
+    RUN(models_take_the_poses_of_their_clips);
     RUN(the_validation_layer_has_nothing_to_say);
     for (int i = 0; i < 2; i++)
         gpu_destroy(devices[i]);
