@@ -39,7 +39,8 @@ static gpu_triangles *triangles_alloc(const renderer *r)
 
 static bool bottom_is_stale(const renderer *r, const acceleration_state *state, uint32_t deformation)
 {
-    return state->versions[deformation] != r->gpu_world->deformations[deformation].version &&
+    const world_deformation *now = &r->gpu_world->deformations[deformation];
+    return now->drawn && state->versions[deformation] != now->version &&
            r->gpu_world->blas[r->scene->deformations[deformation].mesh].id;
 }
 

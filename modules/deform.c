@@ -1,6 +1,7 @@
 // The pass that deforms vertices: see deform.h.
 #include "deform.h"
 #include "modules.h"
+#include "subdivide.h"
 #include "world.h"
 
 #include "lanternfield_renderer_shaders.h"
@@ -22,6 +23,8 @@ typedef struct deform_state {
     gpu_buffer joints, targets; // host, written in the frames in which they change
     deform_place *places; // [deformation_count]
     uint32_t *versions; // [deformation_count]: of what the GPU's vertices are
+    gpu_pipeline level_pipeline;
+    subdivide_stencils *stencils; // [subdivision_count]: of those that deform
 } deform_state;
 
 typedef struct deform_pass {
@@ -65,6 +68,36 @@ static uint32_t pose_write(const renderer *r, const deform_state *state, uint32_
     return count;
 }
 
+// Of levels those that are drawn: coarser and finer ones are behind until they are.
+static bool is_stale(const renderer *r, const deform_state *state, uint32_t index)
+{
+    const world_deformation *now = &r->gpu_world->deformations[index];
+    return state->versions[index] != now->version && (!r->scene->deformations[index].subdivision || now->drawn);
+}
+
+static void levels_execute(const deform_pass *pass, gpu_commands *commands)
+{
+    const renderer *r = pass->r;
+    const world_gpu *w = r->gpu_world;
+    deform_state *state = pass->state;
+    for (uint32_t i = 0; i < r->scene->deformation_count; i++) {
+        const scene_deformation *d = &r->scene->deformations[i];
+        const world_deformation *now = &w->deformations[i];
+        if (!d->subdivision || !is_stale(r, state, i))
+            continue;
+        const subdivide_target target = {
+            .positions = w->positions,
+            .attributes = w->attributes,
+            .previous_positions = w->previous_positions,
+            .first_kept = now->first_kept,
+            .is_new = state->versions[i] + 1 != now->version,
+        };
+        subdivide_record(commands, state->level_pipeline, &state->stencils[d->subdivision - r->scene->subdivisions],
+                         d->subdivision, d->level, &target);
+        state->versions[i] = now->version;
+    }
+}
+
 static void deform_execute(const frame_graph_context *context, void *user)
 {
     const deform_pass *pass = user;
@@ -74,7 +107,7 @@ static void deform_execute(const frame_graph_context *context, void *user)
     for (uint32_t i = 0; i < r->scene->deformation_count; i++) {
         const scene_deformation *d = &r->scene->deformations[i];
         const world_deformation *now = &r->gpu_world->deformations[i];
-        if (state->versions[i] == now->version)
+        if (d->subdivision || !is_stale(r, state, i))
             continue;
         const deform_range range = {
             .vertex_count = d->vertex_count,
@@ -90,6 +123,10 @@ static void deform_execute(const frame_graph_context *context, void *user)
         gpu_dispatch(context->commands, div_up_u32(d->vertex_count, 64), 1, 1);
         state->versions[i] = now->version;
     }
+    if (state->level_pipeline.id) {
+        gpu_memory_barrier(context->commands);
+        levels_execute(pass, context->commands);
+    }
 }
 
 static void deform_setup(renderer *r, void *user)
@@ -97,7 +134,7 @@ static void deform_setup(renderer *r, void *user)
     deform_state *state = user;
     bool changed = false;
     for (uint32_t i = 0; i < r->scene->deformation_count; i++)
-        changed |= state->versions[i] != r->gpu_world->deformations[i].version;
+        changed |= is_stale(r, state, i);
     if (!changed)
         return;
     const world_gpu *w = r->gpu_world;
@@ -144,6 +181,8 @@ static void places_make(const scene_data *s, deform_place *places, deform_place 
     for (uint32_t i = 0; i < s->deformation_count; i++) {
         const scene_deformation *d = &s->deformations[i];
         places[i] = *end;
+        if (d->subdivision)
+            continue;
         end->influences += d->skin == SCENE_NONE ? 0 : d->vertex_count;
         end->offsets += d->target_count * d->vertex_count;
         end->joints += d->skin == SCENE_NONE ? 0 : s->skins[d->skin].joint_count;
@@ -194,7 +233,7 @@ static bool buffers_make(renderer *r, deform_state *state, const deform_place *e
         const deform_place *at = &state->places[i];
         for (uint32_t v = 0; v < d->vertex_count; v++)
             rest[kept++] = vertex_at_rest(s, d->first_vertex + v);
-        if (d->skin != SCENE_NONE)
+        if (d->influences)
             memcpy(influences + at->influences, d->influences, d->vertex_count * sizeof *influences);
         if (d->target_count > 0)
             memcpy(offsets + at->offsets, d->morphs, (size_t)d->target_count * d->vertex_count * sizeof *offsets);
@@ -218,8 +257,29 @@ static void deform_fini(renderer *r, void *user)
     const gpu_buffer buffers[] = {state->rest, state->influences, state->offsets, state->joints, state->targets};
     for (size_t i = 0; i < countof(buffers); i++)
         gpu_buffer_destroy(r->gpu, buffers[i]);
+    gpu_pipeline_destroy(r->gpu, state->level_pipeline);
+    for (uint32_t i = 0; state->stencils && i < r->scene->subdivision_count; i++)
+        subdivide_stencils_destroy(r->gpu, &state->stencils[i]);
+    free(state->stencils);
     free(state->places);
     free(state->versions);
+}
+
+// The stencils of every level that deforms.
+static bool levels_make(renderer *r, deform_state *state)
+{
+    const scene_data *s = r->scene;
+    bool made = true;
+    state->stencils = memory_alloc(max_u32(s->subdivision_count, 1) * sizeof *state->stencils);
+    for (uint32_t i = 0; i < s->subdivision_count && made; i++)
+        if (r->gpu_world->mesh_deformations[s->subdivisions[i].mesh] != SCENE_NONE) {
+            const gpu_compute_pipeline_desc desc = {.shader = &shader_subdivide_comp};
+            if (!state->level_pipeline.id)
+                state->level_pipeline = gpu_compute_pipeline_create(r->gpu, &desc);
+            made =
+                state->level_pipeline.id && subdivide_stencils_create(r->gpu, &s->subdivisions[i], &state->stencils[i]);
+        }
+    return made;
 }
 
 bool deform_init(renderer *r)
@@ -233,5 +293,5 @@ bool deform_init(renderer *r)
     deform_place end;
     places_make(r->scene, state->places, &end);
     state->pipeline = gpu_compute_pipeline_create(r->gpu, &(gpu_compute_pipeline_desc){.shader = &shader_deform_comp});
-    return state->pipeline.id && buffers_make(r, state, &end);
+    return state->pipeline.id && buffers_make(r, state, &end) && levels_make(r, state);
 }

@@ -177,7 +177,7 @@ static void deformations_follow(embree_rays *rays, const world_deformation *defo
     for (uint32_t i = 0; i < rays->scene->deformation_count; i++) {
         deformed_mesh *mesh = &rays->deformed[i];
         mesh->moved = false;
-        if (mesh->rest && mesh->version != deformations[i].version)
+        if (mesh->rest && deformations[i].drawn && mesh->version != deformations[i].version)
             mesh_follow(rays, i, &deformations[i]);
     }
 }

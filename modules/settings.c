@@ -2,6 +2,7 @@
 #include "settings.h"
 
 #include "shaders/shared.h"
+#include "subdivision.h"
 
 #include <ctype.h>
 #include <stdio.h>
@@ -41,6 +42,7 @@ render_settings render_settings_default(void)
         .taa = true,
         .singularity = 0.003f,
         .only = ONLY_ALL,
+        .subdivision_max = 3,
         .seed = 1,
         .auto_exposure = true,
         .exposure = 0,
@@ -380,6 +382,12 @@ static const setting_info table[] = {
     {.name = "only", .type = SETTING_ENUM, FIELD(only), .values = only_names, .help = "render one part of the light"},
     {.name = "no-filter", .type = SETTING_FALSE, FIELD(filter), .help = "leave the shadows unfiltered"},
     {.name = "no-taa", .type = SETTING_FALSE, FIELD(taa), .help = "no temporal anti-aliasing of the shadows"},
+    {.name = "subdivision-max",
+     .type = SETTING_UINT,
+     FIELD(subdivision_max),
+     .max = SUBDIVISION_LEVELS_MAX,
+     .value_name = "N",
+     .help = "finest level of subdivided meshes, 0 to 5; coarser ones are taken far away; 0: cages as they are"},
     {.name = "seed",
      .type = SETTING_UINT,
      FIELD(seed),

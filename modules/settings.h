@@ -44,6 +44,7 @@ typedef struct render_settings {
     bool taa;
     float singularity; // b as a fraction of the scene's radius: 1 / (d^2 + b^2)
     uint32_t only;
+    uint32_t subdivision_max; // finest level of subdivided meshes, 0 to 5; 0: control cages are drawn as they are
     uint32_t seed;
     bool auto_exposure;
     float exposure; // EV, when not automatic

@@ -154,6 +154,7 @@ static void transforms_update(ecs_world *world, void *user)
     renderer *r = user;
     for (ecs_iterator it = ecs_iterate(world, r->gpu_world->node); ecs_next(&it);)
         transform_update(r, it.entity);
+    world_deform_update(r);
 }
 
 // ---- The order of instances
@@ -540,10 +541,10 @@ static void world_extract(ecs_world *world, void *user)
     (void)world;
     renderer *r = user;
     const uint32_t last_count = r->gpu_world->instance_count;
-    world_deform_extract(r);
     const bool listed = instances_find(r);
     if (listed)
         instances_order(r);
+    world_deform_mark(r);
     const bool emission_changed = world_materials_changes(r) & MATERIAL_EMISSION_CHANGED;
     if (emission_changed)
         meshes_find_emitters(r);

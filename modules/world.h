@@ -49,7 +49,9 @@ typedef struct world_source {
 typedef struct world_deformation {
     uint32_t version; // changes of its vertices so far; 0: they are at rest
     bool changed; // the vertices are others than in the last frame
+    bool drawn; // an instance of this frame has the mesh; of a level that has none, vertices and trees stay behind
     bool mirrored; // turned inside out: most of its joints' determinants are negative
+    float scale; // mean of its joints': what they make of a length of 1
     bool stretched; // so far from rest that a tree over the triangles at rest is worth no keeping
     box box, previous_box; // mesh space, around all its vertices, in this frame and the last
     uint32_t first_kept; // number of its first vertex among those of all deformations
@@ -144,9 +146,11 @@ void world_materials_fini(renderer *r);
 uint8_t world_material_changes(const renderer *r, uint32_t index); // MATERIAL_*_CHANGED, since the last frame
 uint8_t world_materials_changes(const renderer *r); // of any of them
 void world_matrix_multiply(const float a[16], const float b[16], float product[16]); // `product` may be either
-// world_deform.c: after the upload; after the transforms, before instances; the last accepts a world half made.
+// world_deform.c: after the upload; after the transforms; once the instances are ordered; the last accepts a world half
+// made.
 bool world_deform_init(renderer *r);
-void world_deform_extract(renderer *r);
+void world_deform_update(renderer *r);
+void world_deform_mark(renderer *r); // which deformations are drawn
 void world_deform_fini(renderer *r);
 // world_lights.c: punctual lights, emissive triangles and the choice among them. Emitters are gathered anew when
 // `moved`, that is when an instance with an emissive material moved or deformed, any instance came or went, or emission

@@ -144,12 +144,30 @@ static box deformed_box(const scene_deformation *d, const deformation_state *sta
     return all;
 }
 
+// Of a level of a subdivided mesh: by the stencil, over the cage.
+static void level_position(const renderer *r, const scene_deformation *d, uint32_t own, float position[3])
+{
+    const scene_subdivision *s = d->subdivision;
+    const uint32_t stencil = s->levels[d->level - 1].vertices[own].stencil;
+    memset(position, 0, 3 * sizeof *position);
+    for (uint32_t i = s->stencils.offsets[stencil]; i < s->stencils.offsets[stencil + 1]; i++) {
+        const subdivision_entry *entry = &s->stencils.entries[i];
+        float p[3];
+        world_deformed_position(r, d->cage, s->first_vertex + entry->vertex, p);
+        glm_vec3_muladds(p, entry->position, position);
+    }
+}
+
 void world_deformed_position(const renderer *r, uint32_t deformation, uint32_t vertex, float position[3])
 {
     const scene_data *s = r->scene;
     const scene_deformation *d = &s->deformations[deformation];
     const world_deformation *now = &r->gpu_world->deformations[deformation];
     const uint32_t own = vertex - d->first_vertex;
+    if (d->subdivision) {
+        level_position(r, d, own, position);
+        return;
+    }
     float p[3];
     memcpy(p, s->positions[vertex], sizeof p);
     for (uint32_t t = 0; t < d->target_count; t++)
@@ -190,12 +208,22 @@ static void pose_follow(const renderer *r, const scene_deformation *d, const def
         scale += cbrtf(volume * volume) / (float)state->joint_count;
     }
     const float area = box_area(&now->box), rest = scale * state->rest_area;
+    now->scale = sqrtf(scale);
     now->mirrored = mirrored > state->joint_count / 2;
     now->stretched = !(area <= STRETCH * rest && area * STRETCH >= rest);
     primitive_boxes_write(r, &r->scene->meshes[d->mesh], &now->box);
 }
 
-void world_deform_extract(renderer *r)
+// The limit surface lies within the cage's hull, so what is known of the cage holds for its levels.
+static void level_follow(const renderer *r, const scene_deformation *d, world_deformation *now)
+{
+    const uint32_t first_kept = now->first_kept;
+    *now = r->gpu_world->deformations[d->cage];
+    now->first_kept = first_kept;
+    primitive_boxes_write(r, &r->scene->meshes[d->mesh], &now->box);
+}
+
+void world_deform_update(renderer *r)
 {
     world_gpu *w = r->gpu_world;
     const scene_data *s = r->scene;
@@ -203,6 +231,10 @@ void world_deform_extract(renderer *r)
         const scene_deformation *d = &s->deformations[i];
         deformation_state *state = &w->deformation_states[i];
         world_deformation *now = &w->deformations[i];
+        if (d->subdivision) {
+            level_follow(r, d, now);
+            continue;
+        }
         now->previous_box = now->box;
         now->changed = d->skin != SCENE_NONE && joints_follow(r, &s->skins[d->skin], state->joints);
         now->changed |= weights_follow(r, d, state->weights);
@@ -211,6 +243,18 @@ void world_deform_extract(renderer *r)
         pose_follow(r, d, state, now);
         now->version++;
         now->changed = r->frame > 0; // before that there was nothing else
+    }
+}
+
+void world_deform_mark(renderer *r)
+{
+    world_gpu *w = r->gpu_world;
+    for (uint32_t i = 0; i < r->scene->deformation_count; i++)
+        w->deformations[i].drawn = false;
+    for (uint32_t i = 0; i < w->instance_count; i++) {
+        const uint32_t index = w->mesh_deformations[w->order[i].mesh];
+        if (index != SCENE_NONE)
+            w->deformations[index].drawn = true;
     }
 }
 
@@ -284,7 +328,10 @@ bool world_deform_init(renderer *r)
         w->mesh_deformations[d->mesh] = i;
         w->deformations[i].first_kept = kept;
         kept += d->vertex_count;
-        deformation_init(r, d, &w->deformation_states[i], &w->deformations[i]);
+        if (d->subdivision)
+            level_follow(r, d, &w->deformations[i]);
+        else
+            deformation_init(r, d, &w->deformation_states[i], &w->deformations[i]);
     }
     w->kept_vertices = kept;
     const gpu_buffer_desc desc = {

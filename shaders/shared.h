@@ -186,6 +186,28 @@ SHARED_STRUCT(deform_range) { // the vertices of one mesh
 // of all images of one size fall on the same few sets of its cache.
 #define PIXEL_GROUP_WIDTH 64
 
+// ---- Subdivision surfaces (modules/subdivision.h)
+
+#define SUBDIVIDE_GROUP 64 // invocations of a workgroup, one a vertex
+
+SHARED_STRUCT(subdivision_entry) { // of a stencil
+    uint vertex; // of the cage
+    float position, tangent1, tangent2; // weights
+} SHARED_END(subdivision_entry, 16)
+
+SHARED_STRUCT(subdivision_vertex) { // of a refined mesh
+    uint stencil;
+    SHARED_VEC2(tangent); // the texture's tangent is x * tangent1 + y * tangent2; both 0: none
+} SHARED_END(subdivision_vertex, 12)
+
+SHARED_STRUCT(subdivision_step) { // of one refined mesh
+    uint first_source; // vertex that the entries count from
+    uint first_vertex, vertex_count; // what is written
+    uint first; // of its subdivision_vertex structs
+    uint first_kept; // in the previous positions
+    uint is_new; // 1: it was not drawn in the last frame, so that its vertices have not moved since
+} SHARED_END(subdivision_step, 24)
+
 // ---- Rays
 
 #define RAY_MISS 0xffffffffu
