@@ -36,13 +36,8 @@ static render_camera camera_of_bounds(const renderer *r)
     return camera;
 }
 
-render_camera renderer_camera_of_scene(const renderer *r, uint32_t index)
+render_camera renderer_camera_at(const scene_camera *source, const float world[16])
 {
-    if (index == SCENE_NONE)
-        return camera_of_bounds(r);
-    assert(index < r->scene->camera_count);
-    const scene_camera *source = &r->scene->cameras[index];
-    const float *world = r->scene->nodes[source->node].world;
     render_camera camera = {.yfov = source->yfov, .near_plane = source->near_plane};
     for (int k = 0; k < 3; k++) {
         camera.eye[k] = world[12 + k];
@@ -50,6 +45,15 @@ render_camera renderer_camera_of_scene(const renderer *r, uint32_t index)
         camera.up[k] = world[4 + k];
     }
     return camera;
+}
+
+render_camera renderer_camera_of_scene(const renderer *r, uint32_t index)
+{
+    if (index == SCENE_NONE)
+        return camera_of_bounds(r);
+    assert(index < r->scene->camera_count);
+    const scene_camera *source = &r->scene->cameras[index];
+    return renderer_camera_at(source, r->scene->nodes[source->node].world);
 }
 
 // Unit axes of the camera. An `up` along the line of sight is replaced by the world axis furthest from it.

@@ -53,7 +53,8 @@
 //   probes             probe[]       see modules/probe.h                               probe
 //   vpl_flux           vec3[paths]   of the traced light paths at their last hit                      vpl_trace
 //   vpl_changed        uint[]        a bit a slot, where not all VPLs are traced anew; see vpl_trace.h  vpl_trace
-//   vpl_mask, vpl_list bits and numbers of the paths that are; vpl_shares, vpl_sources, vpl_elements: see shaders/shared.h
+//   vpl_mask, vpl_list bits and numbers of the paths that are; vpl_shares, vpl_sources, vpl_elements: see
+//   shaders/shared.h
 #pragma once
 
 #include "engine/ecs.h"
@@ -102,6 +103,8 @@ bool renderer_frame(renderer *r);
 
 // A camera of the scene, or with SCENE_NONE one that frames the whole scene.
 render_camera renderer_camera_of_scene(const renderer *r, uint32_t camera);
+// A camera of the scene where its node's transform to the world is `world` (column-major).
+render_camera renderer_camera_at(const scene_camera *camera, const float world[16]);
 
 // ---- For modules. A pass is an entity with a `render_pass` component and a component for its own state. Removing the
 // render_pass component switches the pass off.
