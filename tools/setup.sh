@@ -24,6 +24,7 @@ libtinyexr-dev|OpenEXR images|
 libcjson-dev|statistics and suites|
 libembree-dev|rays on the CPU|
 gnuplot-nox|charts|
+ffmpeg|movies, which lanternfield play makes|
 '
 
 missing=() backports=()
