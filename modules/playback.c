@@ -26,8 +26,8 @@ const char *playback_setting_refusal(const setting_info *info, bool in_event)
         bool in_events_only;
     } refusals[] = {
         {"frames", "a script has as many frames as duration and frame_rate say", false},
-        {"target-ms", "it follows measured times, so that no two runs would be alike; expected settings", false},
-        {"target-error", "it measures over several frames of a still scene; expected settings", false},
+        {"target-ms", "it follows measured times, so no two runs would be alike; see play --record", false},
+        {"target-error", "it chooses settings from what it measures on the way; see play --record", false},
         {"size", "the size stays as it is", true},
         {"method", "the method stays as it is", true},
     };

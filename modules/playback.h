@@ -181,7 +181,7 @@ void playback_destroy(playback *script); // accepts NULL
 bool playback_resolve(playback *script, const scene_data *scene);
 // Sets a render option for all frames, whatever the script says. `text` as for settings_set; NULL for a switch.
 bool playback_override(playback *script, const setting_info *info, const char *text, setting_error *error);
-// Whether a script, or what overrides it, may set this option, now or by an event. NULL, or why not.
+// Whether a script may set this option, or one of its events. NULL, or why not.
 const char *playback_setting_refusal(const setting_info *info, bool in_event);
 
 // ---- What holds at a frame. All are functions of the script alone.

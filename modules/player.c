@@ -19,6 +19,8 @@ struct player {
     entity *lights; // by the script's
     const playback_camera *camera; // of the current frame
     uint32_t next; // frame that follows from the renderer's state
+    render_settings last; // of the last frame
+    bool has_last;
     double milliseconds;
 };
 
@@ -252,6 +254,21 @@ static bool segment_begin(player *p, uint32_t frame)
 
 // ---- Frames
 
+// Automatic settings have the last word on what they choose, also over a cut.
+static void settings_set_of_frame(player *p, uint32_t frame)
+{
+    renderer *const r = p->renderer;
+    const render_settings last = p->last;
+    r->settings = playback_settings_at(p->script, frame);
+    if (p->has_last && (r->settings.target_ms > 0 || r->settings.target_error > 0)) {
+        r->settings.vpls = last.vpls;
+        r->settings.alpha = last.alpha;
+        r->settings.interleave = last.interleave;
+        r->settings.shadow_samples = last.shadow_samples;
+        r->settings.ray_budget = last.ray_budget;
+    }
+}
+
 static bool progressive_frames_render(renderer *r)
 {
     do {
@@ -273,13 +290,15 @@ bool player_frame(player *p, uint32_t frame)
     }
     renderer *const r = p->renderer;
     const double time = playback_time(p->script, frame);
-    r->settings = playback_settings_at(p->script, frame);
+    settings_set_of_frame(p, frame);
     r->time = time;
     camera_set(p, frame);
     nodes_place(p, time);
     lights_set(p, frame);
     switches_set(p, frame);
     const bool ok = progressive_is(r) ? progressive_frames_render(r) : renderer_frame(r);
+    p->last = r->settings;
+    p->has_last = true;
     p->next = frame + 1;
     p->milliseconds = 1000 * (time_now() - start);
     return ok;

@@ -168,6 +168,13 @@ plays "$script" -o "$work/reference" --method path --spp 2 --size 32x18 --range 
 plays "$script" -o "$work/reference2" --method path --spp 2 --size 32x18 --range 2:3
 cmp -s "$work/reference/frame_000002.png" "$work/reference2/frame_000002.png" || fail "the reference of frame 2 differs"
 
+echo "what automatic settings chose plays to the same bytes"
+plays "$script" -o "$work/chosen" --target-ms 3 --record "$work/chosen.json"
+[ "$(grep -c '"vpls"' "$work/chosen.json")" -ge 2 ] || fail "nothing was chosen"
+plays "$work/chosen.json" -o "$work/replayed"
+rm "$work/chosen/playback.txt" "$work/replayed/playback.txt"
+same "$work/chosen" "$work/replayed"
+
 echo "refusals"
 refuses 2 "needs a SCRIPT.json"
 refuses 2 "one SCRIPT.json is enough" "$script" other.json
@@ -179,6 +186,9 @@ refuses 2 ".csv" "$script" --stats a.json
 refuses 2 "at most one folder" "$script" -o a -o b
 refuses 1 "--target-ms: cannot be used to play" "$script" --target-ms 30
 refuses 1 "--target-error: cannot be used to play" "$script" --target-error 0.1
+refuses 1 "--record: expected with" "$script" --record a.json
+refuses 1 "without --range and --resume" "$script" --record a.json --target-ms 30 --resume
+refuses 1 "only --method lgh" "$script" --record a.json --target-ms 30 --method ir
 refuses 1 "--frames: cannot be used to play" "$script" --frames 3
 refuses 1 "--vpls" "$script" --vpls -1
 refuses 1 "--outputs: expected png, exr" "$script" --outputs png,colour

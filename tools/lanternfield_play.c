@@ -42,6 +42,13 @@ static bool resume_read(render_request *request, const char *value, setting_erro
     return true;
 }
 
+static bool record_read(render_request *request, const char *value, setting_error *error)
+{
+    ((play_request *)request)->record = value;
+    return path_has_extension(value, ".json") ||
+           option_refuse(error, "--record", "a file name that ends in .json", value);
+}
+
 static bool stats_read(render_request *request, const char *value, setting_error *error)
 {
     request->stats = value;
@@ -57,6 +64,8 @@ static const command_option play_options[] = {
      outputs_read},
     {"range", "A:B", "frames A to B - 1, counted from 0 (default: all)", range_read},
     {"resume", NULL, "leave the frames that are there (default: off)", resume_read},
+    {"record", "FILE.json", "write the script with what --target-ms or --target-error chose (default: none)",
+     record_read},
     {"stats", "FILE.csv", "write a row a frame: times in ms, lights and rays per pixel (default: none)", stats_read},
 };
 
@@ -77,9 +86,10 @@ static bool setting_read(render_request *request, const setting_info *info, cons
     return true;
 }
 
+// Targets may be given where they are recorded, which is not known yet.
 static const char *setting_refusal(const setting_info *info)
 {
-    return playback_setting_refusal(info, false);
+    return strcmp(info->name, "frames") == 0 ? playback_setting_refusal(info, false) : NULL;
 }
 
 static bool script_read(render_request *request, const char *word)
@@ -133,6 +143,24 @@ static void help_print(FILE *out)
         names);
 }
 
+// What belongs together.
+static bool options_check(const play_request *request)
+{
+    const render_settings *const settings = &request->render.settings;
+    const char *const target = settings->target_ms > 0      ? "target-ms"
+                               : settings->target_error > 0 ? "target-error"
+                                                            : NULL;
+    if (target && !request->record) {
+        log_error("--%s: cannot be used to play: %s", target, playback_setting_refusal(settings_find(target), false));
+        return false;
+    }
+    if (request->record && (!target || request->has_range || request->resume)) {
+        log_error("--record: expected with --target-ms or --target-error, and without --range and --resume");
+        return false;
+    }
+    return !request->record || output_path_check(request->record);
+}
+
 static int options_read(int argc, char **argv, play_request *request)
 {
     *request = (play_request){.render = {.settings = render_settings_default()}};
@@ -142,7 +170,7 @@ static int options_read(int argc, char **argv, play_request *request)
         log_error("play needs a SCRIPT.json; see lanternfield play --help");
         return EXIT_WRONG_USAGE;
     }
-    return code;
+    return code != EXIT_DONE || request->render.help || options_check(request) ? code : EXIT_FAILED;
 }
 
 // ---- One run
@@ -154,6 +182,7 @@ typedef struct play_run {
     player *player;
     play_files files;
     play_stats stats;
+    play_record record;
     uint32_t begin, end; // frames
     uint32_t written; // by this run
     uint32_t rendered;
@@ -221,6 +250,7 @@ static bool run_open(play_run *run)
 static void run_close(play_run *run)
 {
     play_stats_fini(&run->stats);
+    play_record_fini(&run->record);
     play_files_fini(&run->files);
     player_destroy(run->player);
     render_session_close(&run->session);
@@ -261,6 +291,9 @@ static bool frame_play(play_run *run, uint32_t frame, bool wanted)
     renderer *const r = player_renderer(run->player);
     if (run->rendered++ == 0) {
         darkness_warn(r);
+    }
+    if (run->request->record) {
+        play_record_add(&run->record, run->script, r, frame);
     }
     if (!wanted) {
         return true;
@@ -331,7 +364,8 @@ static int play_run_do(play_request *request)
     bool ok = run_open(&run);
     if (ok) {
         interrupt_watch();
-        ok = frames_play(&run) && (!request->movie || movie_finish(&run, &movie_frames)) &&
+        ok = frames_play(&run) && (!request->record || play_record_write(&run.record, run.script, request->record)) &&
+             (!request->movie || movie_finish(&run, &movie_frames)) &&
              render_session_validated(&run.session, &request->render);
     }
     progress_end();

@@ -12,6 +12,7 @@ typedef struct play_request { // strings belong to argv
     const char *script;
     const char *folder, *movie; // NULL: not asked for
     const char *outputs; // names, separated by commas; NULL: the script's
+    const char *record; // file for the script with the choices of automatic settings; NULL: none
     bool has_range, resume;
     uint32_t begin, end; // frames; the end is not among them
     struct {
@@ -52,6 +53,17 @@ bool movie_is(const char *path); // by its extension: .mp4, .mkv, .mov
 bool movie_check(const char *path); // before any work: false, and logged, when it cannot be written
 // Makes the movie of the PNGs of the frames, beside `path`, and renames it. False on failure (logged).
 bool movie_write(const char *path, const play_files *files, uint32_t begin, uint32_t end, double frame_rate);
+
+// ---- The choices of automatic settings as a script: lanternfield_play_record.c.
+typedef struct play_record { // zero-initialise
+    struct cJSON *events; // {"time", "settings"}
+    render_settings now; // as the events so far say; the target left out
+} play_record;
+// After a frame: notes what its settings had that the script and the events so far do not have.
+void play_record_add(play_record *record, const playback *script, const renderer *r, uint32_t frame);
+// Writes the script with the events among its own. False on failure (logged).
+bool play_record_write(const play_record *record, const playback *script, const char *path);
+void play_record_fini(play_record *record);
 
 // ---- A row of statistics a frame: lanternfield_play_stats.c.
 typedef struct play_row {
