@@ -10,6 +10,7 @@
 
 typedef struct masked_primitive { // what the filter of a geometry needs
     const scene_data *scene;
+    const material *material;
     const mesh_primitive *primitive;
 } masked_primitive;
 
@@ -21,6 +22,7 @@ typedef struct placed_mesh { // what an instance was when it was last committed
 
 struct embree_rays {
     const scene_data *scene;
+    const material *materials;
     const float (*positions)[3];
     const uint32_t *indices;
     RTCDevice device;
@@ -42,9 +44,9 @@ static float vertex_alpha(const vertex_attributes *vertex)
 }
 
 // As hit_base_color in scene.glsl.h at lod 0.
-static float hit_alpha(const scene_data *s, const mesh_primitive *p, uint32_t triangle, float u, float v)
+static float hit_alpha(const scene_data *s, const material *m, const mesh_primitive *p, uint32_t triangle, float u,
+                       float v)
 {
-    const material *m = &s->materials[p->material];
     const float weights[3] = {1 - u - v, u, v};
     float vertex_sum = 0, uv[2] = {0};
     for (uint32_t k = 0; k < 3; k++) {
@@ -68,11 +70,11 @@ enum { HIT_U = 3, HIT_V = 4, HIT_PRIMITIVE = 5 };
 static void mask_filter(const struct RTCFilterFunctionNArguments *args)
 {
     const masked_primitive *mask = args->geometryUserPtr;
-    const float cutoff = mask->scene->materials[mask->primitive->material].alpha_cutoff;
     const float *u = (const float *)args->hit + HIT_U * args->N, *v = (const float *)args->hit + HIT_V * args->N;
     const uint32_t *triangle = (const uint32_t *)args->hit + HIT_PRIMITIVE * args->N;
     for (uint32_t i = 0; i < args->N; i++)
-        if (args->valid[i] && !(hit_alpha(mask->scene, mask->primitive, triangle[i], u[i], v[i]) >= cutoff))
+        if (args->valid[i] && !(hit_alpha(mask->scene, mask->material, mask->primitive, triangle[i], u[i], v[i]) >=
+                                mask->material->alpha_cutoff))
             args->valid[i] = 0;
 }
 
@@ -95,7 +97,7 @@ static RTCGeometry geometry_create(embree_rays *rays, const mesh_primitive *p)
                                p->first_index * sizeof *rays->indices, 3 * sizeof *rays->indices, p->index_count / 3);
     if (rays->scene->materials[p->material].flags & MATERIAL_ALPHA_MASK) {
         masked_primitive *mask = &rays->masks[p - rays->scene->primitives];
-        *mask = (masked_primitive){rays->scene, p};
+        *mask = (masked_primitive){rays->scene, &rays->materials[p->material], p};
         rtcSetGeometryUserData(geometry, mask);
         rtcSetGeometryIntersectFilterFunction(geometry, mask_filter);
         rtcSetGeometryOccludedFilterFunction(geometry, mask_filter);
@@ -120,14 +122,16 @@ static RTCScene mesh_create(embree_rays *rays, const scene_mesh *mesh)
     return scene;
 }
 
-embree_rays *embree_rays_create(const scene_data *scene, const float (*positions)[3], const uint32_t *indices)
+embree_rays *embree_rays_create(const scene_data *scene, const material *materials, const float (*positions)[3],
+                                const uint32_t *indices)
 {
     // Building on one thread makes the same tree every time; it takes 140 ms for Sponza's 262K triangles, once.
     RTCDevice device = rtcNewDevice("threads=1");
     if (!device)
         return NULL;
     embree_rays *rays = memory_alloc(sizeof *rays);
-    *rays = (embree_rays){.scene = scene, .positions = positions, .indices = indices, .device = device};
+    *rays = (embree_rays){
+        .scene = scene, .materials = materials, .positions = positions, .indices = indices, .device = device};
     rtcSetDeviceErrorFunction(device, error_note, rays);
     rays->meshes = memory_alloc(max_u32(scene->mesh_count, 1) * sizeof *rays->meshes);
     rays->masks = memory_alloc(max_u32(scene->primitive_count, 1) * sizeof *rays->masks);

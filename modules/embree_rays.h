@@ -8,8 +8,10 @@ typedef struct embree_rays embree_rays;
 
 // Shares the memory of `positions` (vertex_count of the scene, mesh space) and `indices` (index_count): no copy is
 // made, so both outlive the tracer and keep their contents. 16 bytes behind the last position must be readable. `scene`
-// outlives the tracer too. NULL when there is no Embree device (not logged).
-embree_rays *embree_rays_create(const scene_data *scene, const float (*positions)[3], const uint32_t *indices);
+// outlives the tracer too, as do `materials`: the scene's, whose colours may change. NULL when there is no Embree
+// device (not logged).
+embree_rays *embree_rays_create(const scene_data *scene, const material *materials, const float (*positions)[3],
+                                const uint32_t *indices);
 void embree_rays_destroy(embree_rays *rays); // accepts NULL
 
 // Makes the tracer follow the instances; hits count in them. Meshes are built when first instanced, and what did not

@@ -1,5 +1,5 @@
-// The entry to the glTF import: tinygltf's model to a scene_data. Here extensions, nodes, cameras and lights; materials
-// and meshes have files of their own.
+// The entry to the glTF import: tinygltf's model to a scene_data. Here extensions, nodes, cameras and lights; the rest
+// has files of its own.
 #include "gltf_import.hpp"
 
 #include <algorithm>
@@ -53,7 +53,7 @@ namespace
 // ---- Extensions
 
 const char *const supported_extensions[] = {"KHR_lights_punctual", "KHR_materials_emissive_strength",
-                                            "KHR_texture_transform", "KHR_mesh_quantization"};
+                                            "KHR_texture_transform", "KHR_mesh_quantization", "KHR_animation_pointer"};
 
 bool is_supported(const std::string &name)
 {
@@ -122,7 +122,9 @@ scene_light light_read(importer &in, const tinygltf::Light &light, const std::st
             fail("%s: color times intensity is %g, expected 0 to 1e30", where.c_str(), value);
         }
         result.color[i] = static_cast<float>(value);
+        result.hue[i] = static_cast<float>(light.color.empty() ? 1.0 : light.color[i]);
     }
+    result.intensity = static_cast<float>(light.intensity);
     const double inner = light.spot.innerConeAngle, outer = light.spot.outerConeAngle;
     if (result.type == LIGHT_SPOT && !(inner >= 0 && inner < outer && outer <= M_PI_2 + 1e-6)) {
         fail("%s: cone angles %g and %g, expected 0 <= inner < outer <= pi/2", where.c_str(), inner, outer);
@@ -132,7 +134,7 @@ scene_light light_read(importer &in, const tinygltf::Light &light, const std::st
     return result;
 }
 
-void lights_read(importer &in, std::vector<uint32_t> &light_of)
+void lights_read(importer &in)
 {
     in.scene->lights = in.allocate<scene_light>(in.model.lights.size());
     for (size_t i = 0; i < in.model.lights.size(); i++) {
@@ -141,10 +143,10 @@ void lights_read(importer &in, std::vector<uint32_t> &light_of)
         if (light_type(light.type) == SCENE_NONE) {
             scene_warning(in.scene, "%s has the unknown type \"%.50s\" and is left out", where.c_str(),
                           light.type.c_str());
-            light_of.push_back(SCENE_NONE);
+            in.light_of.push_back(SCENE_NONE);
             continue;
         }
-        light_of.push_back(in.scene->light_count);
+        in.light_of.push_back(in.scene->light_count);
         in.scene->lights[in.scene->light_count++] = light_read(in, light, where);
     }
 }
@@ -243,24 +245,6 @@ void rotation_repair(float (&q)[4])
     }
 }
 
-// Columns: the rotation's, scaled; then the translation.
-void matrix_compose(scene_node &node)
-{
-    const float x = node.rotation[0], y = node.rotation[1], z = node.rotation[2], w = node.rotation[3];
-    const float rotation[3][3] = {
-        {1 - 2 * (y * y + z * z), 2 * (x * y + z * w), 2 * (x * z - y * w)},
-        {2 * (x * y - z * w), 1 - 2 * (x * x + z * z), 2 * (y * z + x * w)},
-        {2 * (x * z + y * w), 2 * (y * z - x * w), 1 - 2 * (x * x + y * y)},
-    };
-    for (int column = 0; column < 3; column++) {
-        for (int row = 0; row < 3; row++) {
-            node.matrix[4 * column + row] = rotation[column][row] * node.scale[column];
-        }
-        node.matrix[12 + column] = node.translation[column];
-    }
-    node.matrix[15] = 1;
-}
-
 void transform_read(scene_node &out, const tinygltf::Node &node, const std::string &where)
 {
     out.rotation[3] = out.scale[0] = out.scale[1] = out.scale[2] = 1;
@@ -279,22 +263,22 @@ void transform_read(scene_node &out, const tinygltf::Node &node, const std::stri
     if (!node.scale.empty()) {
         numbers_copy(out.scale, node.scale, where, "scale");
     }
-    matrix_compose(out);
+    scene_matrix_compose(out.translation, out.rotation, out.scale, out.matrix);
 }
 
-uint32_t node_light(const importer &in, const tinygltf::Node &node, const std::vector<uint32_t> &light_of,
-                    const std::string &where)
+uint32_t node_light(const importer &in, const tinygltf::Node &node, const std::string &where)
 {
     const auto extension = node.extensions.find("KHR_lights_punctual");
     if (extension == node.extensions.end() || !extension->second.Has("light")) {
         return SCENE_NONE;
     }
     const double light = number_of(extension->second, "light", -1);
-    return light_of[index_check(light >= 0 && light < 1e9 ? static_cast<int>(light) : -1, in.model.lights.size(), where,
-                                "light")];
+    return in.light_of[index_check(light >= 0 && light < 1e9 ? static_cast<int>(light) : -1, in.model.lights.size(),
+                                   where, "light")];
 }
 
-scene_node node_read(importer &in, size_t index, const std::vector<uint32_t> &light_of)
+// Its skin is glTF's.
+scene_node node_read(importer &in, size_t index)
 {
     const tinygltf::Node &node = in.model.nodes[index];
     const std::string where = label("node", index, node.name);
@@ -303,35 +287,34 @@ scene_node node_read(importer &in, size_t index, const std::vector<uint32_t> &li
     transform_read(result, node, where);
     result.mesh = node.mesh == -1 ? SCENE_NONE : index_check(node.mesh, in.model.meshes.size(), where, "mesh");
     result.camera = node.camera == -1 ? SCENE_NONE : index_check(node.camera, in.model.cameras.size(), where, "camera");
-    result.light = node_light(in, node, light_of, where);
-    if (node.skin != -1) {
-        index_check(node.skin, in.model.skins.size(), where, "skin");
-    }
+    result.light = node_light(in, node, where);
+    result.skin = node.skin == -1 ? SCENE_NONE : index_check(node.skin, in.model.skins.size(), where, "skin");
     return result;
 }
 
 // All nodes are checked; those of the default scene are kept, parents first.
-void nodes_read(importer &in, const std::vector<uint32_t> &light_of)
+void nodes_read(importer &in)
 {
     const tinygltf::Model &model = in.model;
     const std::vector<int> parents = parents_find(model);
     cycles_check(model, parents);
     std::vector<scene_node> nodes;
     for (size_t i = 0; i < model.nodes.size(); i++) {
-        nodes.push_back(node_read(in, i, light_of));
+        nodes.push_back(node_read(in, i));
     }
 
     // Depth first; pushed in reverse, so that siblings keep their order.
     std::vector<int> open = roots_find(in, parents);
     std::reverse(open.begin(), open.end());
-    std::vector<uint32_t> kept(nodes.size(), SCENE_NONE);
+    in.node_of.assign(nodes.size(), SCENE_NONE);
     in.scene->nodes = in.allocate<scene_node>(nodes.size());
     while (!open.empty()) {
         const size_t node = static_cast<size_t>(open.back());
         open.pop_back();
         open.insert(open.end(), model.nodes[node].children.rbegin(), model.nodes[node].children.rend());
-        kept[node] = in.scene->node_count;
-        nodes[node].parent = parents[node] < 0 ? SCENE_NONE : kept[static_cast<size_t>(parents[node])];
+        in.node_of[node] = in.scene->node_count;
+        in.source_of.push_back(static_cast<uint32_t>(node));
+        nodes[node].parent = parents[node] < 0 ? SCENE_NONE : in.node_of[static_cast<size_t>(parents[node])];
         in.scene->nodes[in.scene->node_count++] = nodes[node];
     }
 }
@@ -409,18 +392,16 @@ void import_run(importer &in)
     extensions_check(in);
     views_check(in);
     accessors_check(in);
-    std::vector<uint32_t> light_of;
-    lights_read(in, light_of);
-    nodes_read(in, light_of);
+    lights_read(in);
+    nodes_read(in);
     cameras_read(in);
     materials_read(in);
+    skins_read(in);
     meshes_read(in);
+    deformations_read(in);
+    meshes_keep(in);
+    animations_read(in);
     images_load(in);
-    in.scene->animation_count = static_cast<uint32_t>(in.model.animations.size());
-    in.scene->skin_count = static_cast<uint32_t>(in.model.skins.size());
-    if (in.scene->animation_count > 0) {
-        log_debug("\"%s\": its animations are not played", in.file.path);
-    }
 }
 
 bool import_file(const gltf_file &file, scene_data *scene, gltf_primitive **primitives)
@@ -441,6 +422,8 @@ extern "C" void gltf_primitive_free(gltf_primitive *primitive)
     free(primitive->positions);
     free(primitive->attributes);
     free(primitive->indices);
+    free(primitive->influences);
+    free(primitive->morphs);
 }
 
 extern "C" bool gltf_import(const char *path, scene_data *scene, gltf_primitive **primitives)

@@ -1,6 +1,7 @@
 // The glTF import's inner interface, for scene.c and gltf_*: a file goes through gltf_file.c (container, buffers),
-// gltf_json.c (checks), gltf.cpp, gltf_material.cpp and gltf_mesh.cpp (tinygltf's structures to ours) and gltf_image.c
-// (decoding); scene.c finishes what comes out, with triangle_order.c. Others include scene.h.
+// gltf_json.c (checks), gltf.cpp, gltf_accessor.cpp, gltf_material.cpp, gltf_mesh.cpp, gltf_skin.cpp and
+// gltf_animation.cpp (tinygltf's structures to ours) and gltf_image.c (decoding); scene.c finishes what comes out, with
+// triangle_order.c. Others include scene.h.
 #pragma once
 
 #include "scene.h"
@@ -68,10 +69,14 @@ typedef struct gltf_primitive { // a triangle list as it came, vertices only tho
     vertex_attributes *attributes;
     uint32_t *indices; // in range; a multiple of three
     bool has_normals, has_tangents;
+    scene_influences *influences; // [vertex_count]; NULL: no skin moves it
+    uint32_t target_count;
+    scene_morph *morphs; // [target_count][vertex_count]; NULL: none
 } gltf_primitive;
 
-// Fills `scene` (zeroed but for path and arena) but for vertices, indices, bounds and world matrices;
-// `primitives` gets scene->primitive_count entries, to free(). False on failure, logged; the rest is then freed.
+// Fills `scene` (zeroed but for path and arena) but for vertices, indices, bounds, world matrices and what deformations
+// know of vertices; `primitives` gets scene->primitive_count entries, to free(). False on failure, logged; the rest is
+// then freed.
 bool gltf_import(const char *path, scene_data *scene, gltf_primitive **primitives);
 void gltf_primitive_free(gltf_primitive *primitive);
 

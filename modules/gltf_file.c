@@ -326,6 +326,22 @@ static void indices_hide(cJSON *root)
     }
 }
 
+// tinygltf drops channels whose target has no node, which are those of KHR_animation_pointer: they get one that is
+// none.
+static void channels_complete(cJSON *root)
+{
+    const cJSON *const animations = cJSON_GetObjectItemCaseSensitive(root, "animations");
+    for (const cJSON *animation = animations ? animations->child : NULL; animation; animation = animation->next) {
+        const cJSON *const channels = cJSON_GetObjectItemCaseSensitive(animation, "channels");
+        for (const cJSON *channel = channels->child; channel; channel = channel->next) {
+            cJSON *const target = cJSON_GetObjectItemCaseSensitive(channel, "target");
+            if (!cJSON_GetObjectItemCaseSensitive(target, "node")) {
+                cJSON_AddNumberToObject(target, "node", -1);
+            }
+        }
+    }
+}
+
 bool gltf_file_open(gltf_file *file, const char *path)
 {
     *file = (gltf_file){.path = path};
@@ -343,6 +359,7 @@ bool gltf_file_open(gltf_file *file, const char *path)
     if (ok) {
         images_note(file, cJSON_GetObjectItemCaseSensitive(root, "images"));
         indices_hide(root);
+        channels_complete(root);
         member_delete(root, "buffers");
         member_delete(root, "images");
         file->json = cJSON_PrintUnformatted(root);

@@ -6,6 +6,7 @@ extern "C" {
 #include "modules/gltf.h"
 }
 
+#include <initializer_list>
 #include <stdexcept>
 #include <string>
 #include <tiny_gltf.h>
@@ -38,10 +39,23 @@ struct importer {
     bool uv_set_warned = false;
     uint32_t textures_without_image = 0;
 
-    // Primitives
-    std::vector<gltf_primitive> primitives; // freed by the destructor unless taken
+    std::vector<uint32_t> light_of; // by glTF light, SCENE_NONE: left out
+    std::vector<uint32_t> node_of; // by glTF node, SCENE_NONE: not in the scene that is loaded
+    std::vector<uint32_t> source_of; // by node: glTF's
+
+    // Meshes; by glTF mesh, then copies
+    std::vector<scene_mesh> meshes;
+    std::vector<uint32_t> skin_of_mesh; // of those that its nodes have, one with the fewest joints; SCENE_NONE: none
+    std::vector<mesh_primitive> mesh_primitives;
+    std::vector<gltf_primitive> primitives; // the same order; freed by the destructor unless taken
+    uint64_t vertices = 0, indices = 0, morphs = 0; // asked for so far
     std::vector<uint32_t> local_of; // scratch: accessor's vertex to primitive's vertex
-    uint32_t skipped_modes = 0, skipped_without_positions = 0, cut_lists = 0;
+    uint32_t skipped_modes = 0, skipped_without_positions = 0, cut_lists = 0, cut_joints = 0, weightless_vertices = 0;
+
+    // Animations
+    uint64_t animated_numbers = 0;
+    uint32_t skipped_channels = 0;
+    std::string skipped_channel; // the first, and why
 
     importer(const gltf_file &file, scene_data *scene) : file(file), scene(scene) {}
     ~importer();
@@ -55,14 +69,52 @@ struct importer {
     const char *keep(const std::string &text) { return arena_strdup(&scene->arena, text.c_str()); }
 };
 
-// gltf_material.cpp
-void materials_read(importer &in);
-void images_load(importer &in);
+// ---- gltf_accessor.cpp
 
-// gltf_mesh.cpp
 void views_check(importer &in);
 void accessors_check(importer &in);
 gltf_bytes view_bytes(const importer &in, uint32_t view);
+
+struct accessor_rule {
+    const char *name;
+    std::initializer_list<int> types;
+    bool may_be_integer; // not normalised, as KHR_mesh_quantization allows
+};
+// Refuses other types, and integers that are not normalised where they have to be. Returns the index, checked.
+uint32_t accessor_use(const importer &in, int index, const accessor_rule &rule, const std::string &where);
+// Bytes of an index; 0 for what is no unsigned integer.
+size_t index_size(int component_type);
+
+// Elements of one accessor, checked: `base` is NULL for zeros; sparse replacements are looked up by element.
+struct accessor_reader {
+    const tinygltf::Accessor &accessor;
+    const uint8_t *base = nullptr;
+    uint64_t stride = 0;
+    const uint8_t *sparse_values = nullptr;
+    std::vector<uint32_t> sparse_indices; // strictly increasing
+    size_t size = 0; // bytes of an element
+    uint32_t components; // of an element
+
+    accessor_reader(const importer &in, size_t index);
+    const uint8_t *element(uint32_t i) const;
+    void numbers(uint32_t i, float *values) const; // `components` of them
+    uint32_t integer(uint32_t i, uint32_t component) const; // of unsigned ones
+};
+
+// ---- gltf_material.cpp
+void materials_read(importer &in);
+void images_load(importer &in);
+
+// ---- gltf_mesh.cpp
 void meshes_read(importer &in);
+uint32_t mesh_copy(importer &in, uint32_t mesh, const std::string &where); // `where` wants it
+void meshes_keep(importer &in); // once all are there
+
+// ---- gltf_skin.cpp
+void skins_read(importer &in); // before the meshes
+void deformations_read(importer &in); // after them
+
+// ---- gltf_animation.cpp
+void animations_read(importer &in);
 
 } // namespace gltf

@@ -197,6 +197,47 @@ static bool camera_check(const gltf_file *file, const cJSON *camera, const json_
     return members_check(file, details, &here, type[0] == 'p' ? perspective : orthographic);
 }
 
+// Each element of the array `name` is an object with what is `required`.
+static bool elements_check(const gltf_file *file, const cJSON *parent, const json_place *parent_place, const char *name,
+                           const char *const *required)
+{
+    const cJSON *const array = cJSON_GetObjectItemCaseSensitive(parent, name);
+    json_place place = place_of(parent_place, array, 0);
+    if (!cJSON_IsArray(array)) {
+        return gltf_fail(file, "%s: expected an array", place.text);
+    }
+    int index = 0;
+    for (const cJSON *item = array->child; item; item = item->next, index++) {
+        const json_place here = place_of(&place, item, index);
+        if (!members_check(file, item, &here, required)) {
+            return false;
+        }
+    }
+    return true;
+}
+
+static bool animation_check(const gltf_file *file, const cJSON *animation, const json_place *place)
+{
+    static const char *const channel[] = {"sampler", "target", NULL}, *const sampler[] = {"input", "output", NULL},
+                             *const target[] = {"path", NULL};
+    if (!elements_check(file, animation, place, "channels", channel) ||
+        !elements_check(file, animation, place, "samplers", sampler)) {
+        return false;
+    }
+    const json_place channels = place_of(place, cJSON_GetObjectItemCaseSensitive(animation, "channels"), 0);
+    int index = 0;
+    for (const cJSON *item = cJSON_GetObjectItemCaseSensitive(animation, "channels")->child; item;
+         item = item->next, index++) {
+        const json_place here = place_of(&channels, item, index);
+        const cJSON *const object = cJSON_GetObjectItemCaseSensitive(item, "target");
+        const json_place there = place_of(&here, object, 0);
+        if (!members_check(file, object, &there, target)) {
+            return false;
+        }
+    }
+    return true;
+}
+
 static bool light_check(const gltf_file *file, const cJSON *light, const json_place *place)
 {
     return strcmp(string_of(light, "type"), "spot") != 0 ||
@@ -212,7 +253,7 @@ typedef struct section_rule {
 
 static const section_rule section_rules[] = {
     {"accessors", {"componentType", "count", "type"}, accessor_check},
-    {"animations", {"channels", "samplers"}, NULL},
+    {"animations", {"channels", "samplers"}, animation_check},
     {"buffers", {"byteLength"}, NULL},
     {"bufferViews", {"buffer", "byteLength"}, view_check},
     {"cameras", {"type"}, camera_check},

@@ -149,6 +149,23 @@ uint32_t alpha_flags(const tinygltf::Material &in, float &cutoff, uint32_t &blen
     return in.alphaMode == "MASK" || in.alphaMode == "BLEND" ? MATERIAL_ALPHA_MASK : 0;
 }
 
+double strength_of(const tinygltf::Material &source)
+{
+    const auto extension = source.extensions.find("KHR_materials_emissive_strength");
+    return extension == source.extensions.end() ? 1 : number_of(extension->second, "emissiveStrength", 1);
+}
+
+// After material_read, which has checked the product.
+scene_emission emission_read(const tinygltf::Material &source)
+{
+    scene_emission emission = {};
+    emission.strength = static_cast<float>(strength_of(source));
+    for (size_t i = 0; i < std::min<size_t>(3, source.emissiveFactor.size()); i++) {
+        emission.factor[i] = static_cast<float>(source.emissiveFactor[i]);
+    }
+    return emission;
+}
+
 material material_read(importer &in, size_t index, uint32_t &blended)
 {
     const tinygltf::Material &source = in.model.materials[index];
@@ -158,9 +175,7 @@ material material_read(importer &in, size_t index, uint32_t &blended)
     for (size_t i = 0; i < std::min<size_t>(4, pbr.baseColorFactor.size()); i++) {
         result.base_color[i] = factor_check(pbr.baseColorFactor[i], where, "baseColorFactor");
     }
-    const auto extension = source.extensions.find("KHR_materials_emissive_strength");
-    const double strength =
-        extension == source.extensions.end() ? 1 : number_of(extension->second, "emissiveStrength", 1);
+    const double strength = strength_of(source);
     for (size_t i = 0; i < std::min<size_t>(3, source.emissiveFactor.size()); i++) {
         result.emissive[i] = factor_check(source.emissiveFactor[i] * strength, where, "emissiveFactor times strength");
     }
@@ -187,12 +202,15 @@ void materials_read(importer &in)
     const size_t count = in.model.materials.size();
     scene->materials = in.allocate<material>(count + 1);
     scene->material_names = in.allocate<const char *>(count + 1);
+    scene->emissions = in.allocate<scene_emission>(count + 1);
     uint32_t blended = 0;
     for (size_t i = 0; i < count; i++) {
         scene->materials[i] = material_read(in, i, blended);
+        scene->emissions[i] = emission_read(in.model.materials[i]);
         scene->material_names[i] = in.keep(in.model.materials[i].name);
     }
     scene->materials[count] = material_default();
+    scene->emissions[count].strength = 1;
     scene->material_names[count] = "default";
     scene->material_count = static_cast<uint32_t>(count + 1);
     if (blended > 0) {

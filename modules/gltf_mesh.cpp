@@ -1,4 +1,4 @@
-// glTF accessors and primitives. Every accessor is checked against its buffer view and buffer before any is read.
+// glTF primitives: vertices with what deforms them, and indices.
 #include "gltf_import.hpp"
 
 #include <algorithm>
@@ -12,234 +12,56 @@ namespace
 {
 
 // What a file may ask for in all, so that small files cannot ask for all memory by naming the same bytes many times.
-const uint64_t VERTICES_MAX = 1u << 25, INDICES_MAX = 1u << 26;
-// Elements that an accessor may claim without a buffer view behind them: they are zeros, and cost the file nothing.
-const uint64_t UNBACKED_MAX = 1u << 20;
-
-// ---- Accessors
-
-size_t element_size(const tinygltf::Accessor &accessor)
-{
-    const int size = tinygltf::GetComponentSizeInBytes(static_cast<uint32_t>(accessor.componentType));
-    const int count = tinygltf::GetNumComponentsInType(static_cast<uint32_t>(accessor.type));
-    return size > 0 && count > 0 ? static_cast<size_t>(size) * static_cast<size_t>(count) : 0;
-}
-
-// Elements of `size` bytes, `stride` apart, from `offset` on: do they all lie in the view?
-void range_check(const importer &in, int view, uint64_t offset, uint64_t count, uint64_t size, uint64_t stride,
-                 const std::string &where)
-{
-    const uint64_t length =
-        in.model.bufferViews[index_check(view, in.model.bufferViews.size(), where, "buffer view")].byteLength;
-    const bool fits =
-        count == 0 || (offset <= length && size <= length - offset && (count - 1) <= (length - offset - size) / stride);
-    if (!fits) {
-        fail("%s: %llu elements of %llu bytes from byte %llu on go past the %llu bytes of buffer view %d",
-             where.c_str(), static_cast<unsigned long long>(count), static_cast<unsigned long long>(size),
-             static_cast<unsigned long long>(offset), static_cast<unsigned long long>(length), view);
-    }
-}
-
-size_t index_size(int component_type)
-{
-    return component_type == TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE    ? 1
-           : component_type == TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT ? 2
-           : component_type == TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT   ? 4
-                                                                      : 0;
-}
-
-void sparse_check(const importer &in, const tinygltf::Accessor &accessor, const std::string &where)
-{
-    const auto &sparse = accessor.sparse;
-    const size_t size = index_size(sparse.indices.componentType);
-    if (sparse.count < 0 || static_cast<uint64_t>(sparse.count) > accessor.count) {
-        fail("%s: %d sparse elements, expected at most its count, %zu", where.c_str(), sparse.count, accessor.count);
-    }
-    if (size == 0) {
-        fail("%s: sparse indices of component type %d, expected 5121, 5123 or 5125", where.c_str(),
-             sparse.indices.componentType);
-    }
-    if (sparse.indices.byteOffset < 0 || sparse.values.byteOffset < 0) {
-        fail("%s: negative sparse byteOffset", where.c_str());
-    }
-    const uint64_t count = static_cast<uint64_t>(sparse.count);
-    range_check(in, sparse.indices.bufferView, static_cast<uint64_t>(sparse.indices.byteOffset), count, size, size,
-                where + ".sparse.indices");
-    range_check(in, sparse.values.bufferView, static_cast<uint64_t>(sparse.values.byteOffset), count,
-                element_size(accessor), element_size(accessor), where + ".sparse.values");
-}
-
-uint64_t stride_of(const importer &in, const tinygltf::Accessor &accessor)
-{
-    const uint64_t stride = in.model.bufferViews[static_cast<size_t>(accessor.bufferView)].byteStride;
-    return stride ? stride : element_size(accessor);
-}
-
-std::string accessor_label(const importer &in, size_t index)
-{
-    return label("accessor", index, in.model.accessors[index].name);
-}
-
-void accessor_check(const importer &in, size_t index)
-{
-    const tinygltf::Accessor &accessor = in.model.accessors[index];
-    const std::string where = accessor_label(in, index);
-    if (element_size(accessor) == 0) {
-        fail("%s: unknown component type %d", where.c_str(), accessor.componentType);
-    }
-    if (accessor.bufferView != -1) {
-        index_check(accessor.bufferView, in.model.bufferViews.size(), where, "buffer view");
-        const uint64_t stride = stride_of(in, accessor);
-        if (stride < element_size(accessor)) {
-            fail("%s: a stride of %llu bytes, its elements have %zu", where.c_str(),
-                 static_cast<unsigned long long>(stride), element_size(accessor));
-        }
-        range_check(in, accessor.bufferView, accessor.byteOffset, accessor.count, element_size(accessor), stride,
-                    where);
-    } else if (accessor.count > UNBACKED_MAX) {
-        fail("%s claims %zu elements without a buffer view", where.c_str(), accessor.count);
-    }
-    if (accessor.sparse.isSparse) {
-        sparse_check(in, accessor, where);
-    }
-}
-
-// Elements of one accessor, checked: `base` is NULL for zeros; sparse replacements are looked up by element.
-struct accessor_reader {
-    const tinygltf::Accessor &accessor;
-    const uint8_t *base = nullptr;
-    uint64_t stride = 0;
-    const uint8_t *sparse_values = nullptr;
-    std::vector<uint32_t> sparse_indices; // strictly increasing
-    size_t size = 0;
-
-    accessor_reader(const importer &in, size_t index);
-    const uint8_t *element(uint32_t i) const;
-};
-
-uint32_t index_load(const uint8_t *bytes, size_t size)
-{
-    uint32_t value = 0;
-    memcpy(&value, bytes, size); // little endian, as this machine
-    return value;
-}
-
-accessor_reader::accessor_reader(const importer &in, size_t index)
-    : accessor(in.model.accessors[index]), size(element_size(accessor))
-{
-    if (accessor.bufferView != -1) {
-        base = view_bytes(in, static_cast<uint32_t>(accessor.bufferView)).data + accessor.byteOffset;
-        stride = stride_of(in, accessor);
-    }
-    if (!accessor.sparse.isSparse || accessor.sparse.count == 0) {
-        return;
-    }
-    const auto &sparse = accessor.sparse;
-    const uint8_t *const indices =
-        view_bytes(in, static_cast<uint32_t>(sparse.indices.bufferView)).data + sparse.indices.byteOffset;
-    const size_t bytes = index_size(sparse.indices.componentType);
-    for (size_t i = 0; i < static_cast<size_t>(sparse.count); i++) {
-        const uint32_t element = index_load(indices + i * bytes, bytes);
-        if (element >= accessor.count || (i > 0 && element <= sparse_indices.back())) {
-            fail("%s: sparse index %zu is %u, expected increasing ones below %zu", accessor_label(in, index).c_str(), i,
-                 element, accessor.count);
-        }
-        sparse_indices.push_back(element);
-    }
-    sparse_values = view_bytes(in, static_cast<uint32_t>(sparse.values.bufferView)).data + sparse.values.byteOffset;
-}
-
-const uint8_t *accessor_reader::element(uint32_t i) const
-{
-    static const uint8_t zeros[16 * sizeof(double)] = {};
-    const auto replaced = std::lower_bound(sparse_indices.begin(), sparse_indices.end(), i);
-    if (replaced != sparse_indices.end() && *replaced == i) {
-        return sparse_values + static_cast<size_t>(replaced - sparse_indices.begin()) * size;
-    }
-    return base ? base + i * stride : zeros;
-}
-
-template <typename T> double component_load(const uint8_t *bytes)
-{
-    T value;
-    memcpy(&value, bytes, sizeof(value));
-    return value;
-}
-
-// Normalised integers by the equations of the glTF specification, section 3.11; others (KHR_mesh_quantization) as they
-// are.
-float component_read(const uint8_t *bytes, int type, bool normalized)
-{
-    switch (type) {
-    case TINYGLTF_COMPONENT_TYPE_BYTE:
-        return static_cast<float>(normalized ? std::max(component_load<int8_t>(bytes) / 127, -1.0)
-                                             : component_load<int8_t>(bytes));
-    case TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE:
-        return static_cast<float>(component_load<uint8_t>(bytes) / (normalized ? 255 : 1));
-    case TINYGLTF_COMPONENT_TYPE_SHORT:
-        return static_cast<float>(normalized ? std::max(component_load<int16_t>(bytes) / 32767, -1.0)
-                                             : component_load<int16_t>(bytes));
-    case TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT:
-        return static_cast<float>(component_load<uint16_t>(bytes) / (normalized ? 65535 : 1));
-    default: // the attributes' check lets only float through
-        return static_cast<float>(component_load<float>(bytes));
-    }
-}
+// Morphs are counted by target and vertex.
+const uint64_t VERTICES_MAX = 1u << 25, INDICES_MAX = 1u << 26, MORPHS_MAX = 1u << 25;
 
 // ---- Attributes
 
-struct attribute_rule {
-    const char *name;
-    std::initializer_list<int> types;
-    bool may_be_integer; // not normalised, as KHR_mesh_quantization allows
+typedef std::map<std::string, int> attribute_map; // accessors by name
+
+const accessor_rule position_rule = {"POSITION", {TINYGLTF_TYPE_VEC3}, true};
+const accessor_rule normal_rule = {"NORMAL", {TINYGLTF_TYPE_VEC3}, false};
+const accessor_rule tangent_rule = {"TANGENT", {TINYGLTF_TYPE_VEC4}, false};
+const accessor_rule tangent_morph_rule = {"TANGENT", {TINYGLTF_TYPE_VEC3}, false};
+const accessor_rule uv_rules[2] = {{"TEXCOORD_0", {TINYGLTF_TYPE_VEC2}, true},
+                                   {"TEXCOORD_1", {TINYGLTF_TYPE_VEC2}, true}};
+const accessor_rule color_rule = {"COLOR_0", {TINYGLTF_TYPE_VEC3, TINYGLTF_TYPE_VEC4}, false};
+const accessor_rule weight_rules[2] = {{"WEIGHTS_0", {TINYGLTF_TYPE_VEC4}, false},
+                                       {"WEIGHTS_1", {TINYGLTF_TYPE_VEC4}, false}};
+
+// A primitive while it is read.
+struct primitive_source {
+    const tinygltf::Primitive &primitive;
+    std::string where;
+    size_t vertex_count; // of its accessors
+    std::vector<uint32_t> used; // the accessors' number of each vertex
 };
 
-const attribute_rule position_rule = {"POSITION", {TINYGLTF_TYPE_VEC3}, true};
-const attribute_rule normal_rule = {"NORMAL", {TINYGLTF_TYPE_VEC3}, false};
-const attribute_rule tangent_rule = {"TANGENT", {TINYGLTF_TYPE_VEC4}, false};
-const attribute_rule uv_rules[2] = {{"TEXCOORD_0", {TINYGLTF_TYPE_VEC2}, true},
-                                    {"TEXCOORD_1", {TINYGLTF_TYPE_VEC2}, true}};
-const attribute_rule color_rule = {"COLOR_0", {TINYGLTF_TYPE_VEC3, TINYGLTF_TYPE_VEC4}, false};
-
-void attribute_check(const importer &in, uint32_t index, const attribute_rule &rule, size_t count,
-                     const std::string &where)
+void count_check(const importer &in, uint32_t accessor, const char *name, const primitive_source &source,
+                 const std::string &where)
 {
-    const tinygltf::Accessor &accessor = in.model.accessors[index];
-    const int type = accessor.componentType;
-    const bool is_integer = type >= TINYGLTF_COMPONENT_TYPE_BYTE && type <= TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT;
-    if (std::find(rule.types.begin(), rule.types.end(), accessor.type) == rule.types.end() ||
-        !(type == TINYGLTF_COMPONENT_TYPE_FLOAT || (is_integer && (accessor.normalized || rule.may_be_integer)))) {
-        fail("%s: accessor %u has the wrong type for %s (component type %d)", where.c_str(), index, rule.name, type);
-    }
-    if (accessor.count != count) {
-        fail("%s: accessor %u (%s) has %zu elements, POSITION has %zu", where.c_str(), index, rule.name, accessor.count,
-             count);
+    const size_t count = in.model.accessors[accessor].count;
+    if (count != source.vertex_count) {
+        fail("%s: accessor %u (%s) has %zu elements, POSITION has %zu", where.c_str(), accessor, name, count,
+             source.vertex_count);
     }
 }
 
-// Calls store(vertex, components) for each used vertex; false when the primitive lacks the attribute.
+// Calls store(vertex, components) for each used vertex; false when `attributes` lack it.
 template <typename F>
-bool attribute_read(const importer &in, const tinygltf::Primitive &primitive, const attribute_rule &rule,
-                    const std::vector<uint32_t> &used, const std::string &where, F store)
+bool attribute_read(const importer &in, const attribute_map &attributes, const accessor_rule &rule,
+                    const primitive_source &source, const std::string &where, F store)
 {
-    const auto attribute = primitive.attributes.find(rule.name);
-    if (attribute == primitive.attributes.end()) {
+    const auto attribute = attributes.find(rule.name);
+    if (attribute == attributes.end()) {
         return false;
     }
-    const uint32_t index = index_check(attribute->second, in.model.accessors.size(), where, "accessor");
-    const size_t count = in.model.accessors[static_cast<size_t>(primitive.attributes.at("POSITION"))].count;
-    attribute_check(in, index, rule, count, where);
+    const uint32_t index = accessor_use(in, attribute->second, rule, where);
+    count_check(in, index, rule.name, source, where);
     const accessor_reader reader(in, index);
-    const int type = reader.accessor.componentType;
-    const size_t components =
-        static_cast<size_t>(tinygltf::GetNumComponentsInType(static_cast<uint32_t>(reader.accessor.type)));
-    const size_t bytes = reader.size / components;
-    for (uint32_t i = 0; i < used.size(); i++) {
+    for (uint32_t i = 0; i < source.used.size(); i++) {
         float values[4] = {0, 0, 0, 1}; // alpha is 1 where colours have none
-        const uint8_t *const element = reader.element(used[i]);
-        for (size_t c = 0; c < components; c++) {
-            values[c] = component_read(element + c * bytes, type, reader.accessor.normalized);
-        }
+        reader.numbers(source.used[i], values);
         store(i, values);
     }
     return true;
@@ -250,42 +72,169 @@ uint32_t unorm16(float value) // not a number becomes 0
     return value > 0 ? static_cast<uint32_t>(std::min(value, 1.0f) * 65535 + 0.5f) : 0;
 }
 
-void positions_read(const importer &in, const tinygltf::Primitive &source, const std::vector<uint32_t> &used,
-                    const std::string &where, gltf_primitive &out)
+void vector_check(const float *v, const char *what, uint32_t vertex, int accessor, const std::string &where)
 {
-    out.positions = static_cast<float(*)[3]>(memory_alloc(used.size() * sizeof(*out.positions)));
-    attribute_read(in, source, position_rule, used, where, [&](uint32_t i, const float *p) {
-        if (!std::isfinite(p[0]) || !std::isfinite(p[1]) || !std::isfinite(p[2])) {
-            fail("%s: the position of vertex %u (accessor %d) is not finite", where.c_str(), used[i],
-                 source.attributes.at("POSITION"));
-        }
+    if (!std::isfinite(v[0]) || !std::isfinite(v[1]) || !std::isfinite(v[2])) {
+        fail("%s: the %s of vertex %u (accessor %d) is not finite", where.c_str(), what, vertex, accessor);
+    }
+}
+
+void positions_read(const importer &in, const primitive_source &source, gltf_primitive &out)
+{
+    const attribute_map &attributes = source.primitive.attributes;
+    out.positions = static_cast<float(*)[3]>(memory_alloc(source.used.size() * sizeof(*out.positions)));
+    attribute_read(in, attributes, position_rule, source, source.where, [&](uint32_t i, const float *p) {
+        vector_check(p, "position", source.used[i], attributes.at("POSITION"), source.where);
         std::copy_n(p, 3, out.positions[i]);
     });
 }
 
-void attributes_read(const importer &in, const tinygltf::Primitive &source, const std::vector<uint32_t> &used,
-                     const std::string &where, gltf_primitive &out)
+void attributes_read(const importer &in, const primitive_source &source, gltf_primitive &out)
 {
     vertex_attributes *const vertices =
-        static_cast<vertex_attributes *>(memory_alloc(used.size() * sizeof(*out.attributes)));
+        static_cast<vertex_attributes *>(memory_alloc(source.used.size() * sizeof(*out.attributes)));
     out.attributes = vertices;
-    for (size_t i = 0; i < used.size(); i++) {
+    for (size_t i = 0; i < source.used.size(); i++) {
         vertices[i].color_rg = vertices[i].color_ba = 0xffffffff;
     }
-    out.has_normals = attribute_read(in, source, normal_rule, used, where,
-                                     [=](uint32_t i, const float *n) { std::copy_n(n, 3, vertices[i].normal); });
+    const auto read = [&](const accessor_rule &rule, auto store) {
+        return attribute_read(in, source.primitive.attributes, rule, source, source.where, store);
+    };
+    out.has_normals = read(normal_rule, [=](uint32_t i, const float *n) { std::copy_n(n, 3, vertices[i].normal); });
     // Tangents without normals are to be ignored (glTF 2.0, section 3.7.2.1).
-    out.has_tangents =
-        out.has_normals && attribute_read(in, source, tangent_rule, used, where,
-                                          [=](uint32_t i, const float *t) { std::copy_n(t, 4, vertices[i].tangent); });
-    attribute_read(in, source, uv_rules[0], used, where,
-                   [=](uint32_t i, const float *uv) { std::copy_n(uv, 2, vertices[i].uv0); });
-    attribute_read(in, source, uv_rules[1], used, where,
-                   [=](uint32_t i, const float *uv) { std::copy_n(uv, 2, vertices[i].uv1); });
-    attribute_read(in, source, color_rule, used, where, [=](uint32_t i, const float *c) {
+    out.has_tangents = out.has_normals &&
+                       read(tangent_rule, [=](uint32_t i, const float *t) { std::copy_n(t, 4, vertices[i].tangent); });
+    read(uv_rules[0], [=](uint32_t i, const float *uv) { std::copy_n(uv, 2, vertices[i].uv0); });
+    read(uv_rules[1], [=](uint32_t i, const float *uv) { std::copy_n(uv, 2, vertices[i].uv1); });
+    read(color_rule, [=](uint32_t i, const float *c) {
         vertices[i].color_rg = unorm16(c[0]) | unorm16(c[1]) << 16;
         vertices[i].color_ba = unorm16(c[2]) | unorm16(c[3]) << 16;
     });
+}
+
+// ---- Morph targets
+
+// Normals and tangents only where the primitive itself has them.
+void target_read(const importer &in, const primitive_source &source, size_t target, gltf_primitive &out)
+{
+    const attribute_map &attributes = source.primitive.targets[target];
+    const std::string where = source.where + " target " + std::to_string(target);
+    scene_morph *const morphs = out.morphs + target * source.used.size();
+    const auto read = [&](const accessor_rule &rule, const char *what, float(scene_morph::*member)[3]) {
+        attribute_read(in, attributes, rule, source, where, [&](uint32_t i, const float *v) {
+            vector_check(v, what, source.used[i], attributes.at(rule.name), where);
+            std::copy_n(v, 3, morphs[i].*member);
+        });
+    };
+    read(position_rule, "position", &scene_morph::position);
+    if (out.has_normals) {
+        read(normal_rule, "normal", &scene_morph::normal);
+    }
+    if (out.has_tangents) {
+        read(tangent_morph_rule, "tangent", &scene_morph::tangent);
+    }
+}
+
+void morphs_read(const importer &in, const primitive_source &source, gltf_primitive &out)
+{
+    const size_t count = source.primitive.targets.size();
+    if (count == 0) {
+        return;
+    }
+    out.target_count = static_cast<uint32_t>(count);
+    out.morphs = static_cast<scene_morph *>(memory_alloc(count * source.used.size() * sizeof(scene_morph)));
+    for (size_t i = 0; i < count; i++) {
+        target_read(in, source, i, out);
+    }
+}
+
+// ---- Influences
+
+enum { SET_SIZE = 4 }; // joints of an attribute
+
+uint32_t joints_use(const importer &in, const primitive_source &source, const std::string &name)
+{
+    const uint32_t index =
+        index_check(source.primitive.attributes.at(name), in.model.accessors.size(), source.where, "accessor");
+    const tinygltf::Accessor &accessor = in.model.accessors[index];
+    const size_t size = index_size(accessor.componentType);
+    if (accessor.type != TINYGLTF_TYPE_VEC4 || size == 0 || size > sizeof(uint16_t)) {
+        fail("%s: accessor %u has the wrong type for %s (component type %d)", source.where.c_str(), index, name.c_str(),
+             accessor.componentType);
+    }
+    count_check(in, index, name.c_str(), source, source.where);
+    return index;
+}
+
+// Joints and weights `set`, if the primitive has them. What has no weight is joint 0.
+bool influences_set_read(const importer &in, const primitive_source &source, uint32_t set, const scene_skin &skin,
+                         scene_influences *influences)
+{
+    const attribute_map &attributes = source.primitive.attributes;
+    const char *const where = source.where.c_str();
+    const std::string joints_name = "JOINTS_" + std::to_string(set), weights_name = weight_rules[set].name;
+    const bool has_joints = attributes.count(joints_name) > 0, has_weights = attributes.count(weights_name) > 0;
+    if (has_joints != has_weights) {
+        fail("%s has %s without %s", where, (has_joints ? joints_name : weights_name).c_str(),
+             (has_joints ? weights_name : joints_name).c_str());
+    }
+    if (!has_joints) {
+        return false;
+    }
+    const uint32_t accessor = joints_use(in, source, joints_name);
+    const accessor_reader joints(in, accessor);
+    attribute_read(in, attributes, weight_rules[set], source, source.where, [&](uint32_t i, const float *weights) {
+        for (uint32_t k = 0; k < SET_SIZE; k++) {
+            const uint32_t joint = weights[k] != 0 ? joints.integer(source.used[i], k) : 0;
+            if (!(weights[k] >= 0 && weights[k] < 1e30f)) {
+                fail("%s: weight %u of vertex %u (accessor %d) is %g, expected 0 or more", where, k, source.used[i],
+                     attributes.at(weights_name), static_cast<double>(weights[k]));
+            }
+            if (joint >= skin.joint_count) {
+                fail("%s: joint %u of vertex %u (accessor %u) is %u, skin \"%s\" has %u joints", where, k,
+                     source.used[i], accessor, joint, skin.name, skin.joint_count);
+            }
+            influences[i].joints[SET_SIZE * set + k] = static_cast<uint16_t>(joint);
+            influences[i].weights[SET_SIZE * set + k] = weights[k];
+        }
+    });
+    return true;
+}
+
+// Sorts by falling weight, and makes the sum 1. False where there is no weight: the first joint then has it.
+bool influences_normalize(scene_influences &of)
+{
+    double sum = 0;
+    for (int i = 0; i < SCENE_INFLUENCES; i++) {
+        sum += static_cast<double>(of.weights[i]);
+        for (int k = i; k > 0 && of.weights[k] > of.weights[k - 1]; k--) {
+            std::swap(of.weights[k], of.weights[k - 1]);
+            std::swap(of.joints[k], of.joints[k - 1]);
+        }
+    }
+    if (!(sum > 0)) {
+        of.weights[0] = 1;
+        return false;
+    }
+    for (float &weight : of.weights) {
+        weight = static_cast<float>(static_cast<double>(weight) / sum);
+    }
+    return true;
+}
+
+void influences_read(importer &in, const primitive_source &source, const scene_skin &skin, gltf_primitive &out)
+{
+    if (source.primitive.attributes.count("JOINTS_0") == 0) {
+        return;
+    }
+    out.influences = static_cast<scene_influences *>(memory_alloc(source.used.size() * sizeof(*out.influences)));
+    for (uint32_t set = 0; set < SCENE_INFLUENCES / SET_SIZE; set++) {
+        influences_set_read(in, source, set, skin, out.influences);
+    }
+    for (size_t i = 0; i < source.used.size(); i++) {
+        in.weightless_vertices += !influences_normalize(out.influences[i]);
+    }
+    in.cut_joints += source.primitive.attributes.count("JOINTS_2") > 0;
 }
 
 // ---- Indices
@@ -312,7 +261,7 @@ std::vector<uint32_t> indices_read(const importer &in, const tinygltf::Primitive
     const accessor_reader reader(in, index);
     indices.resize(accessor.count);
     for (size_t i = 0; i < accessor.count; i++) {
-        indices[i] = index_load(reader.element(static_cast<uint32_t>(i)), bytes);
+        indices[i] = reader.integer(static_cast<uint32_t>(i), 0);
         if (indices[i] >= vertex_count) {
             fail("%s: index %zu (accessor %u) is %u, expected less than the %zu vertices", where.c_str(), i, index,
                  indices[i], vertex_count);
@@ -378,33 +327,36 @@ bool is_drawable(importer &in, const tinygltf::Primitive &primitive)
     return true;
 }
 
-void primitive_read(importer &in, const tinygltf::Primitive &source, const std::string &where,
-                    std::vector<mesh_primitive> &list)
+void primitive_read(importer &in, const tinygltf::Primitive &primitive, const std::string &where,
+                    const scene_skin *skin)
 {
-    if (!is_drawable(in, source)) {
+    if (!is_drawable(in, primitive)) {
         return;
     }
-    const uint32_t position =
-        index_check(source.attributes.at("POSITION"), in.model.accessors.size(), where, "accessor");
+    const uint32_t position = accessor_use(in, primitive.attributes.at("POSITION"), position_rule, where);
     const size_t vertex_count = in.model.accessors[position].count;
-    attribute_check(in, position, position_rule, vertex_count, where);
-    std::vector<uint32_t> indices = triangles_make(in, indices_read(in, source, vertex_count, where), source.mode);
-    const std::vector<uint32_t> used = vertices_used(in, indices, vertex_count);
+    std::vector<uint32_t> indices =
+        triangles_make(in, indices_read(in, primitive, vertex_count, where), primitive.mode);
+    const primitive_source source = {primitive, where, vertex_count, vertices_used(in, indices, vertex_count)};
 
     in.primitives.emplace_back(); // the importer owns it from here on, whatever is thrown
     gltf_primitive &out = in.primitives.back();
     out = {};
-    out.vertex_count = static_cast<uint32_t>(used.size());
+    out.vertex_count = static_cast<uint32_t>(source.used.size());
     out.index_count = static_cast<uint32_t>(indices.size());
     out.indices = static_cast<uint32_t *>(memory_alloc(indices.size() * sizeof(uint32_t)));
     std::copy(indices.begin(), indices.end(), out.indices);
-    positions_read(in, source, used, where, out);
-    attributes_read(in, source, used, where, out);
+    positions_read(in, source, out);
+    attributes_read(in, source, out);
+    morphs_read(in, source, out);
+    if (skin) {
+        influences_read(in, source, *skin, out);
+    }
 
-    mesh_primitive primitive = {};
+    mesh_primitive made = {};
     const uint32_t last = in.scene->material_count - 1;
-    primitive.material = source.material == -1 ? last : index_check(source.material, last, where, "material");
-    list.push_back(primitive);
+    made.material = primitive.material == -1 ? last : index_check(primitive.material, last, where, "material");
+    in.mesh_primitives.push_back(made);
 }
 
 std::string primitive_label(const importer &in, size_t mesh, size_t primitive)
@@ -413,12 +365,25 @@ std::string primitive_label(const importer &in, size_t mesh, size_t primitive)
 }
 
 // Before anything is allocated; sums of numbers up to 2^40 do not overflow before one of them is found too large.
-void totals_check(const importer &in)
+void totals_add(importer &in, uint64_t vertices, uint64_t indices, uint64_t targets, bool has_normals,
+                const std::string &where)
 {
-    uint64_t vertices = 0, indices = 0;
+    in.vertices += vertices;
+    in.indices += indices;
+    in.morphs += targets * (has_normals ? vertices : indices); // without normals no triangles share vertices
+    if (in.vertices > VERTICES_MAX || in.indices > INDICES_MAX || in.morphs > MORPHS_MAX) {
+        fail("%s: more than %llu vertices, %llu triangles or %llu vertices of morph targets in all", where.c_str(),
+             static_cast<unsigned long long>(VERTICES_MAX), static_cast<unsigned long long>(INDICES_MAX / 3),
+             static_cast<unsigned long long>(MORPHS_MAX));
+    }
+}
+
+void totals_check(importer &in)
+{
     for (size_t i = 0; i < in.model.meshes.size(); i++) {
         for (size_t k = 0; k < in.model.meshes[i].primitives.size(); k++) {
-            const std::map<std::string, int> &attributes = in.model.meshes[i].primitives[k].attributes;
+            const tinygltf::Primitive &primitive = in.model.meshes[i].primitives[k];
+            const attribute_map &attributes = primitive.attributes;
             const auto position = attributes.find("POSITION"), index = attributes.find(GLTF_INDICES);
             const std::string where = primitive_label(in, i, k);
             const auto count_of = [&](int accessor) -> uint64_t {
@@ -426,15 +391,47 @@ void totals_check(const importer &in)
             };
             const uint64_t corners = position == attributes.end() ? 0 : count_of(position->second);
             const uint64_t used = index == attributes.end() ? corners : count_of(index->second);
-            const bool is_list = in.model.meshes[i].primitives[k].mode == TINYGLTF_MODE_TRIANGLES;
-            vertices += std::min(corners, used);
-            indices += is_list ? used : 3 * used;
-            if (vertices > VERTICES_MAX || indices > INDICES_MAX) {
-                fail("%s: more than %llu vertices or %llu triangles in all", where.c_str(),
-                     static_cast<unsigned long long>(VERTICES_MAX), static_cast<unsigned long long>(INDICES_MAX / 3));
-            }
+            const bool is_list = primitive.mode == TINYGLTF_MODE_TRIANGLES;
+            totals_add(in, std::min(corners, used), is_list ? used : 3 * used, primitive.targets.size(),
+                       attributes.count("NORMAL") > 0, where);
         }
     }
+}
+
+// All of a mesh's primitives have the same number of targets, and have joints or not.
+void mesh_check(const importer &in, const scene_mesh &mesh, const std::string &where)
+{
+    for (uint32_t i = 1; i < mesh.primitive_count; i++) {
+        const gltf_primitive &first = in.primitives[mesh.first_primitive],
+                             &other = in.primitives[mesh.first_primitive + i];
+        if (other.target_count != first.target_count) {
+            fail("%s: a primitive has %u morph targets, another has %u", where.c_str(), first.target_count,
+                 other.target_count);
+        }
+        if (!other.influences != !first.influences) {
+            fail("%s has a skin; one of its primitives has JOINTS_0, another has not", where.c_str());
+        }
+    }
+}
+
+template <typename T> T *copied(const T *from, size_t count)
+{
+    T *const copy = from ? static_cast<T *>(memory_alloc(count * sizeof(T))) : nullptr;
+    if (copy && count > 0) {
+        memcpy(copy, from, count * sizeof(T));
+    }
+    return copy;
+}
+
+gltf_primitive primitive_copied(const gltf_primitive &from)
+{
+    gltf_primitive copy = from;
+    copy.positions = copied(from.positions, from.vertex_count);
+    copy.attributes = copied(from.attributes, from.vertex_count);
+    copy.indices = copied(from.indices, from.index_count);
+    copy.influences = copied(from.influences, from.vertex_count);
+    copy.morphs = copied(from.morphs, static_cast<size_t>(from.target_count) * from.vertex_count);
+    return copy;
 }
 
 void skipped_warn(const importer &in)
@@ -449,65 +446,64 @@ void skipped_warn(const importer &in)
         scene_warning(in.scene, "%u triangle lists are not a multiple of three long; the rest is left out",
                       in.cut_lists);
     }
+    if (in.cut_joints > 0) {
+        scene_warning(in.scene, "%u primitives have more than %d joints a vertex; the rest is left out", in.cut_joints,
+                      SCENE_INFLUENCES);
+    }
+    if (in.weightless_vertices > 0) {
+        scene_warning(in.scene, "%u vertices of skins have no weight; they follow the first joint",
+                      in.weightless_vertices);
+    }
 }
 
 } // namespace
 
-gltf_bytes view_bytes(const importer &in, uint32_t view)
-{
-    const std::string where = label("buffer view", view, "");
-    const tinygltf::BufferView &source =
-        in.model.bufferViews[index_check(static_cast<int>(view), in.model.bufferViews.size(), "file", "buffer view")];
-    const gltf_buffer &buffer = in.file.buffers[index_check(source.buffer, in.file.buffer_count, where, "buffer")];
-    if (!buffer.bytes.data) {
-        fail("%s: %s has no bytes: neither a URI nor a binary chunk", where.c_str(), buffer.name);
-    }
-    return {buffer.bytes.data + source.byteOffset, source.byteLength};
-}
-
-void views_check(importer &in)
-{
-    for (size_t i = 0; i < in.model.bufferViews.size(); i++) {
-        const tinygltf::BufferView &view = in.model.bufferViews[i];
-        const std::string where = label("buffer view", i, view.name);
-        const gltf_buffer &buffer = in.file.buffers[index_check(view.buffer, in.file.buffer_count, where, "buffer")];
-        // A placeholder has no bytes; that matters only to those who want them.
-        if (buffer.bytes.data &&
-            (view.byteOffset > buffer.bytes.size || view.byteLength > buffer.bytes.size - view.byteOffset)) {
-            fail("%s: %zu bytes from byte %zu on go past the %llu bytes of %s", where.c_str(), view.byteLength,
-                 view.byteOffset, static_cast<unsigned long long>(buffer.bytes.size), buffer.name);
-        }
-    }
-}
-
-void accessors_check(importer &in)
-{
-    for (size_t i = 0; i < in.model.accessors.size(); i++) {
-        accessor_check(in, i);
-    }
-}
-
 void meshes_read(importer &in)
 {
     totals_check(in);
-    scene_data *const scene = in.scene;
-    std::vector<mesh_primitive> list;
-    scene->meshes = in.allocate<scene_mesh>(in.model.meshes.size());
     for (size_t i = 0; i < in.model.meshes.size(); i++) {
         const tinygltf::Mesh &mesh = in.model.meshes[i];
-        scene_mesh &out = scene->meshes[scene->mesh_count++];
+        const uint32_t skin = in.skin_of_mesh[i];
+        scene_mesh out = {};
         out.name = in.keep(mesh.name);
-        out.first_primitive = static_cast<uint32_t>(list.size());
+        out.first_primitive = static_cast<uint32_t>(in.primitives.size());
+        out.deformation = SCENE_NONE;
         for (size_t k = 0; k < mesh.primitives.size(); k++) {
-            primitive_read(in, mesh.primitives[k], label("mesh", i, mesh.name) + " primitive " + std::to_string(k),
-                           list);
+            primitive_read(in, mesh.primitives[k], primitive_label(in, i, k),
+                           skin == SCENE_NONE ? nullptr : &in.scene->skins[skin]);
         }
-        out.primitive_count = static_cast<uint32_t>(list.size()) - out.first_primitive;
+        out.primitive_count = static_cast<uint32_t>(in.primitives.size()) - out.first_primitive;
+        mesh_check(in, out, label("mesh", i, mesh.name));
+        in.meshes.push_back(out);
     }
-    scene->primitives = in.allocate<mesh_primitive>(list.size());
-    std::copy(list.begin(), list.end(), scene->primitives);
-    scene->primitive_count = static_cast<uint32_t>(list.size());
     skipped_warn(in);
+}
+
+uint32_t mesh_copy(importer &in, uint32_t mesh, const std::string &where)
+{
+    scene_mesh copy = in.meshes[mesh];
+    const uint32_t first = copy.first_primitive;
+    copy.first_primitive = static_cast<uint32_t>(in.primitives.size());
+    for (uint32_t i = first; i < first + copy.primitive_count; i++) {
+        const gltf_primitive &from = in.primitives[i];
+        totals_add(in, from.vertex_count, from.index_count, from.target_count, from.has_normals, where);
+        in.primitives.emplace_back();
+        in.primitives.back() = primitive_copied(in.primitives[i]);
+        in.mesh_primitives.push_back(mesh_primitive(in.mesh_primitives[i]));
+    }
+    in.meshes.push_back(copy);
+    return static_cast<uint32_t>(in.meshes.size() - 1);
+}
+
+void meshes_keep(importer &in)
+{
+    scene_data *const scene = in.scene;
+    scene->meshes = in.allocate<scene_mesh>(in.meshes.size());
+    std::copy(in.meshes.begin(), in.meshes.end(), scene->meshes);
+    scene->mesh_count = static_cast<uint32_t>(in.meshes.size());
+    scene->primitives = in.allocate<mesh_primitive>(in.mesh_primitives.size());
+    std::copy(in.mesh_primitives.begin(), in.mesh_primitives.end(), scene->primitives);
+    scene->primitive_count = static_cast<uint32_t>(in.mesh_primitives.size());
 }
 
 } // namespace gltf

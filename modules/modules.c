@@ -5,6 +5,7 @@
 bool modules_init(renderer *r)
 {
     static bool (*const inits[])(renderer *) = {
+        animation_init, // before each frame: what plays poses nodes, morph targets, lights and materials
         automatic_init, // between frames: chooses settings for a time or an error
         rays_init, // traces the batches of rays that the other passes make
         light_rays_init, // sums up the light of the shadow rays that nothing is in the way of

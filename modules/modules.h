@@ -5,6 +5,7 @@
 
 bool modules_init(renderer *r); // false on failure (logged)
 
+bool animation_init(renderer *r);
 bool automatic_init(renderer *r);
 bool rays_init(renderer *r);
 bool light_rays_init(renderer *r);

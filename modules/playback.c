@@ -1,5 +1,6 @@
 // Playback scripts over time: what holds at a frame, and what of the scene a script names.
 #include "playback.h"
+#include "animation.h"
 
 #include "shaders/shared.h"
 
@@ -300,11 +301,7 @@ static bool clips_resolve(playback *script, const scene_data *scene)
 {
     for (uint32_t i = 0; i < script->clip_count; i++) {
         playback_clip *const clip = &script->clips[i];
-        clip->animation = SCENE_NONE;
-        for (uint32_t k = scene->animation_count; k-- > 0;) {
-            const char *const name = scene->animations[k].name;
-            clip->animation = name && strcmp(name, clip->name) == 0 ? k : clip->animation;
-        }
+        clip->animation = animation_find(scene, clip->name);
         if (clip->animation == SCENE_NONE) {
             return missing(script, clip->line, "an animation", clip->name);
         }

@@ -1,5 +1,6 @@
 // Plays scripts: sets what holds at a frame as settings, camera and components, and renders it.
 #include "player.h"
+#include "animation_system.h"
 #include "progressive.h"
 #include "world.h"
 
@@ -15,9 +16,7 @@ struct player {
     void (*prepare)(renderer *r, void *user);
     void *user;
     renderer *renderer;
-    entity *nodes; // by the scene's
     entity *lights; // by the script's
-    const playback_camera *camera; // of the current frame
     uint32_t next; // frame that follows from the renderer's state
     render_settings last; // of the last frame
     bool has_last;
@@ -75,7 +74,8 @@ static void nodes_place(player *p, double time)
                 playback_curve_at(parts[k].curve, time, parts[k].value);
             }
         }
-        node_component *const node = ecs_get(p->renderer->world, p->nodes[track->node], p->renderer->gpu_world->node);
+        node_component *const node = ecs_get(p->renderer->world, p->renderer->gpu_world->node_entities[track->node],
+                                             p->renderer->gpu_world->node);
         matrix_of_trs(translation, rotation, scale, node->matrix);
     }
 }
@@ -118,9 +118,10 @@ static void node_switch(player *p, uint32_t top, bool visible)
             continue;
         }
         if (visible) {
-            *(mesh_component *)ecs_add(r->world, p->nodes[i], r->gpu_world->mesh) = (mesh_component){mesh};
+            *(mesh_component *)ecs_add(r->world, p->renderer->gpu_world->node_entities[i], r->gpu_world->mesh) =
+                (mesh_component){mesh};
         } else {
-            ecs_remove(r->world, p->nodes[i], r->gpu_world->mesh);
+            ecs_remove(r->world, p->renderer->gpu_world->node_entities[i], r->gpu_world->mesh);
         }
     }
 }
@@ -136,7 +137,8 @@ static light_component scene_light_component(const scene_light *light)
 static void light_switch(player *p, const playback_event *event, bool on)
 {
     const renderer *const r = p->renderer;
-    const entity light = event->light != SCENE_NONE ? p->lights[event->light] : p->nodes[event->node];
+    const entity light =
+        event->light != SCENE_NONE ? p->lights[event->light] : p->renderer->gpu_world->node_entities[event->node];
     if (!on) {
         ecs_remove(r->world, light, r->gpu_world->light);
     } else if (!ecs_get(r->world, light, r->gpu_world->light)) {
@@ -160,76 +162,51 @@ static void switches_set(player *p, uint32_t frame)
 
 // ---- Camera
 
-// What the scene itself shows gives what the script leaves out.
+// When the nodes are where they will be. What the scene itself shows gives what the script leaves out.
 static void camera_set(player *p, uint32_t frame)
 {
     renderer *const r = p->renderer;
-    p->camera = playback_camera_of(p->script, frame);
-    r->camera = renderer_camera_of_scene(r, p->scene->camera_count > 0 ? 0 : SCENE_NONE);
-    if (!p->camera || p->camera->name) {
+    const playback_camera *const camera = playback_camera_of(p->script, frame);
+    const uint32_t first = p->scene->camera_count > 0 ? 0 : SCENE_NONE;
+    r->camera = renderer_camera_of_scene(r, camera && camera->name ? camera->camera : first);
+    if (!camera) {
         return;
     }
-    const playback_pose pose = playback_pose_at(p->script, p->camera, frame);
-    memcpy(r->camera.eye, pose.position, sizeof(r->camera.eye));
-    memcpy(r->camera.target, pose.target, sizeof(r->camera.target));
-    memcpy(r->camera.up, (float[]){0, 1, 0}, sizeof(r->camera.up));
+    playback_pose pose = camera->orbit;
+    if (!camera->name) {
+        pose = playback_pose_at(p->script, camera, frame);
+        memcpy(r->camera.eye, pose.position, sizeof(r->camera.eye));
+        memcpy(r->camera.target, pose.target, sizeof(r->camera.target));
+        memcpy(r->camera.up, (float[]){0, 1, 0}, sizeof(r->camera.up));
+    }
     r->camera.yfov = pose.yfov > 0 ? pose.yfov : r->camera.yfov;
-    r->camera.near_plane = p->camera->znear > 0 ? p->camera->znear : r->camera.near_plane;
-}
-
-// The camera of the scene that is looked through, SCENE_NONE where the script places one.
-static uint32_t camera_followed(const player *p)
-{
-    if (p->camera) {
-        return p->camera->name ? p->camera->camera : SCENE_NONE;
-    }
-    return p->scene->camera_count > 0 ? 0 : SCENE_NONE;
-}
-
-// In the frame, when the nodes are where they will be.
-static void camera_follow(ecs_world *world, void *user)
-{
-    player *const p = user;
-    const uint32_t camera = camera_followed(p);
-    if (camera == SCENE_NONE) {
-        return;
-    }
-    const scene_camera *const source = &p->scene->cameras[camera];
-    const transform_component *const transform =
-        ecs_get(world, p->nodes[source->node], p->renderer->gpu_world->transform);
-    p->renderer->camera = renderer_camera_at(source, transform->world);
-    if (p->camera && p->camera->orbit.yfov > 0) {
-        p->renderer->camera.yfov = p->camera->orbit.yfov;
-    }
-    if (p->camera && p->camera->znear > 0) {
-        p->renderer->camera.near_plane = p->camera->znear;
-    }
+    r->camera.near_plane = camera->znear > 0 ? camera->znear : r->camera.near_plane;
 }
 
 // ---- A renderer for a segment
-
-// The world spawns the scene's nodes in their order.
-static void nodes_find(player *p)
-{
-    uint32_t count = 0;
-    for (ecs_iterator it = ecs_iterate(p->renderer->world, p->renderer->gpu_world->node); ecs_next(&it);) {
-        assert(count < p->scene->node_count);
-        p->nodes[count++] = it.entity;
-    }
-    assert(count == p->scene->node_count);
-}
 
 static void lights_add(player *p)
 {
     for (uint32_t i = 0; i < p->script->light_count; i++) {
         const playback_light *const light = &p->script->lights[i];
         if (!light->added) {
-            p->lights[i] = p->nodes[light->node];
+            p->lights[i] = p->renderer->gpu_world->node_entities[light->node];
             continue;
         }
         p->lights[i] = ecs_entity_create(p->renderer->world);
         node_component *const node = ecs_add(p->renderer->world, p->lights[i], p->renderer->gpu_world->node);
         node->name = light->name;
+    }
+}
+
+static void clips_play(player *p)
+{
+    for (uint32_t i = 0; i < p->script->clip_count; i++) {
+        const playback_clip *const clip = &p->script->clips[i];
+        animation_play(p->renderer, &(animation_clip){.animation = clip->animation,
+                                                      .start = clip->start,
+                                                      .speed = clip->speed,
+                                                      .loop = clip->loop});
     }
 }
 
@@ -241,11 +218,8 @@ static bool segment_begin(player *p, uint32_t frame)
     if (!p->renderer) {
         return false;
     }
-    nodes_find(p);
     lights_add(p);
-    const ecs_system_desc follow = {
-        .name = "player camera", .phase = ECS_PHASE_UPDATE, .run = camera_follow, .user = p};
-    ecs_system_register(p->renderer->world, &follow);
+    clips_play(p);
     if (p->prepare) {
         p->prepare(p->renderer, p->user);
     }
@@ -292,10 +266,11 @@ bool player_frame(player *p, uint32_t frame)
     const double time = playback_time(p->script, frame);
     settings_set_of_frame(p, frame);
     r->time = time;
-    camera_set(p, frame);
     nodes_place(p, time);
     lights_set(p, frame);
     switches_set(p, frame);
+    animation_update(r);
+    camera_set(p, frame);
     const bool ok = progressive_is(r) ? progressive_frames_render(r) : renderer_frame(r);
     p->last = r->settings;
     p->has_last = true;
@@ -324,7 +299,6 @@ player *player_create(gpu *gpu, const scene_data *scene, playback *script, void 
     }
     player *const p = memory_alloc(sizeof(*p));
     *p = (player){.gpu = gpu, .scene = scene, .script = script, .prepare = prepare, .user = user, .next = UINT32_MAX};
-    p->nodes = memory_alloc(max_u32(scene->node_count, 1) * sizeof(*p->nodes));
     p->lights = memory_alloc(max_u32(script->light_count, 1) * sizeof(*p->lights));
     return p;
 }
@@ -335,7 +309,6 @@ void player_destroy(player *p)
         return;
     }
     renderer_destroy(p->renderer);
-    free(p->nodes);
     free(p->lights);
     free(p);
 }

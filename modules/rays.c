@@ -271,8 +271,8 @@ static void scene_update(const frame_graph_context *context, void *user)
 static void embree_make(renderer *r, rays_state *state)
 {
     const world_gpu *w = r->gpu_world;
-    state->embree =
-        embree_rays_create(r->scene, gpu_buffer_map(r->gpu, w->positions), gpu_buffer_map(r->gpu, w->indices));
+    state->embree = embree_rays_create(r->scene, w->material_data, gpu_buffer_map(r->gpu, w->positions),
+                                       gpu_buffer_map(r->gpu, w->indices));
     state->no_embree = !state->embree;
     if (state->no_embree && r->settings.rays == RAYS_AUTO)
         log_info("--rays auto: Embree has no device here; rays are traced by the Vulkan device");

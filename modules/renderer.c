@@ -36,15 +36,20 @@ static render_camera camera_of_bounds(const renderer *r)
     return camera;
 }
 
-render_camera renderer_camera_at(const scene_camera *source, const float world[16])
+// Where the scene's node stands by the node components of it and its parents: before the transforms of the next frame
+// are made. As the loader multiplies them, so that a node that nothing moved is where the loader put it.
+static void node_world(const renderer *r, uint32_t node, float world[16])
 {
-    render_camera camera = {.yfov = source->yfov, .near_plane = source->near_plane};
-    for (int k = 0; k < 3; k++) {
-        camera.eye[k] = world[12 + k];
-        camera.target[k] = world[12 + k] - world[8 + k];
-        camera.up[k] = world[4 + k];
+    const scene_node *source = &r->scene->nodes[node];
+    const node_component *component = ecs_get(r->world, r->gpu_world->node_entities[node], r->gpu_world->node);
+    const float *local = component ? component->matrix : source->matrix;
+    if (source->parent == SCENE_NONE) {
+        memcpy(world, local, 16 * sizeof(float));
+        return;
     }
-    return camera;
+    float parent[16];
+    node_world(r, source->parent, parent);
+    scene_matrix_multiply(parent, local, world);
 }
 
 render_camera renderer_camera_of_scene(const renderer *r, uint32_t index)
@@ -53,7 +58,15 @@ render_camera renderer_camera_of_scene(const renderer *r, uint32_t index)
         return camera_of_bounds(r);
     assert(index < r->scene->camera_count);
     const scene_camera *source = &r->scene->cameras[index];
-    return renderer_camera_at(source, r->scene->nodes[source->node].world);
+    float world[16];
+    node_world(r, source->node, world);
+    render_camera camera = {.yfov = source->yfov, .near_plane = source->near_plane};
+    for (int k = 0; k < 3; k++) {
+        camera.eye[k] = world[12 + k];
+        camera.target[k] = world[12 + k] - world[8 + k];
+        camera.up[k] = world[4 + k];
+    }
+    return camera;
 }
 
 // Unit axes of the camera. An `up` along the line of sight is replaced by the world axis furthest from it.
@@ -220,11 +233,11 @@ renderer *renderer_create(gpu *gpu, const scene_data *scene, const render_settin
     const component_desc state_desc = {
         .name = "pass_state", .size = sizeof(pass_state), .fini = pass_state_fini, .user = r};
     r->pass_state = ecs_component_register(r->world, &state_desc);
-    r->camera = renderer_camera_of_scene(r, scene->camera_count ? 0 : SCENE_NONE);
     if (!r->graph || !world_init(r) || !modules_init(r)) {
         renderer_destroy(r);
         return NULL;
     }
+    r->camera = renderer_camera_of_scene(r, scene->camera_count ? 0 : SCENE_NONE);
     const ecs_system_desc constants = {
         .name = "constants", .phase = ECS_PHASE_EXTRACT, .run = constants_extract, .user = r};
     ecs_system_register(r->world, &constants);

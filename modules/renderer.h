@@ -101,10 +101,8 @@ void renderer_destroy(renderer *r); // accepts NULL
 // Runs the world's systems once: one frame. False when the device or a declaration failed (logged).
 bool renderer_frame(renderer *r);
 
-// A camera of the scene, or with SCENE_NONE one that frames the whole scene.
+// A camera of the scene, where its node is now, or with SCENE_NONE one that frames the whole scene at rest.
 render_camera renderer_camera_of_scene(const renderer *r, uint32_t camera);
-// A camera of the scene where its node's transform to the world is `world` (column-major).
-render_camera renderer_camera_at(const scene_camera *camera, const float world[16]);
 
 // ---- For modules. A pass is an entity with a `render_pass` component and a component for its own state. Removing the
 // render_pass component switches the pass off.

@@ -62,6 +62,30 @@ static void triangle_cross(const gltf_primitive *p, const uint32_t *triangle, fl
 
 // ---- Repairs
 
+// Whether whatever deforms the primitive takes both vertices the same way.
+static bool vertices_move_alike(const gltf_primitive *p, uint32_t a, uint32_t b)
+{
+    bool alike = !p->influences || memcmp(&p->influences[a], &p->influences[b], sizeof(*p->influences)) == 0;
+    for (uint32_t i = 0; i < p->target_count && alike; i++) {
+        const scene_morph *const morphs = p->morphs + (size_t)i * p->vertex_count;
+        alike = memcmp(morphs[a].position, morphs[b].position, sizeof(morphs[a].position)) == 0;
+    }
+    return alike;
+}
+
+// A triangle without area at rest may get one by deformation, unless it moves as a whole or has an edge without length.
+static bool area_may_come(const gltf_primitive *p, const uint32_t *triangle)
+{
+    bool whole = true, edges = true;
+    for (int i = 0; i < 3; i++) {
+        const uint32_t from = triangle[i], to = triangle[(i + 1) % 3];
+        const bool alike = vertices_move_alike(p, from, to);
+        whole = whole && alike;
+        edges = edges && !(alike && memcmp(p->positions[from], p->positions[to], sizeof(*p->positions)) == 0);
+    }
+    return !whole && edges;
+}
+
 // Returns how many there were. In single precision, as the shaders will take the cross product's length.
 static uint32_t zero_area_triangles_drop(gltf_primitive *p)
 {
@@ -69,7 +93,7 @@ static uint32_t zero_area_triangles_drop(gltf_primitive *p)
     for (uint32_t i = 0; i < p->index_count; i += 3) {
         float normal[3];
         triangle_cross(p, p->indices + i, normal);
-        if (dot(normal, normal) >= FLT_MIN) {
+        if (dot(normal, normal) >= FLT_MIN || area_may_come(p, p->indices + i)) {
             memmove(p->indices + kept, p->indices + i, 3 * sizeof(uint32_t));
             kept += 3;
         }
@@ -79,27 +103,85 @@ static uint32_t zero_area_triangles_drop(gltf_primitive *p)
     return dropped;
 }
 
-// glTF asks for flat normals where there are none, so no two triangles may share a vertex.
-static void flat_normals_make(gltf_primitive *p)
+// The elements of `from` by index, a vertex for each; frees `from`.
+static void *corners_take(void *from, const gltf_primitive *p, size_t size)
 {
-    float(*const positions)[3] = memory_alloc(p->index_count * sizeof(*positions));
-    vertex_attributes *const attributes = memory_alloc(p->index_count * sizeof(*attributes));
+    char *const corners = memory_alloc(p->index_count * size);
     for (uint32_t i = 0; i < p->index_count; i++) {
-        float normal[3];
-        triangle_cross(p, p->indices + i / 3 * 3, normal);
-        normalize(normal);
-        memcpy(positions[i], p->positions[p->indices[i]], sizeof(*positions));
-        attributes[i] = p->attributes[p->indices[i]];
-        memcpy(attributes[i].normal, normal, sizeof(normal));
+        memcpy(corners + i * size, (const char *)from + p->indices[i] * size, size);
+    }
+    free(from);
+    return corners;
+}
+
+static void morphs_unshare(gltf_primitive *p)
+{
+    scene_morph *const morphs = memory_alloc((size_t)p->target_count * p->index_count * sizeof(*morphs));
+    for (size_t target = 0; target < p->target_count; target++) {
+        for (uint32_t i = 0; i < p->index_count; i++) {
+            morphs[target * p->index_count + i] = p->morphs[target * p->vertex_count + p->indices[i]];
+        }
+    }
+    free(p->morphs);
+    p->morphs = morphs;
+}
+
+static void vertices_unshare(gltf_primitive *p)
+{
+    p->positions = corners_take(p->positions, p, sizeof(*p->positions));
+    p->attributes = corners_take(p->attributes, p, sizeof(*p->attributes));
+    if (p->influences) {
+        p->influences = corners_take(p->influences, p, sizeof(*p->influences));
+    }
+    if (p->target_count > 0) {
+        morphs_unshare(p);
     }
     for (uint32_t i = 0; i < p->index_count; i++) {
         p->indices[i] = i;
     }
-    free(p->positions);
-    free(p->attributes);
-    p->positions = positions;
-    p->attributes = attributes;
     p->vertex_count = p->index_count;
+}
+
+// The normal of a triangle whose vertices are not shared, with a morph target's positions added to it where `morphs` is
+// not NULL. Up where it has no area.
+static void flat_normal(const gltf_primitive *p, uint32_t first, const scene_morph *morphs, float normal[3])
+{
+    float corners[3][3], edge1[3], edge2[3];
+    for (uint32_t i = 0; i < 3; i++) {
+        memcpy(corners[i], p->positions[first + i], sizeof(corners[i]));
+        if (morphs) {
+            add_scaled(corners[i], morphs[first + i].position, 1);
+        }
+    }
+    subtract(corners[1], corners[0], edge1);
+    subtract(corners[2], corners[0], edge2);
+    cross(edge1, edge2, normal);
+    if (!normalize(normal)) {
+        memcpy(normal, (const float[3]){0, 1, 0}, 3 * sizeof(float));
+    }
+}
+
+// glTF asks for flat normals where there are none, so no two triangles may share a vertex. A morph target takes them to
+// its own flat normals: exact at the weights 0 and 1. Skins turn them as they turn normals that the file has.
+static void flat_normals_make(gltf_primitive *p)
+{
+    vertices_unshare(p);
+    for (uint32_t i = 0; i < p->vertex_count; i += 3) {
+        float normal[3];
+        flat_normal(p, i, NULL, normal);
+        for (uint32_t k = i; k < i + 3; k++) {
+            memcpy(p->attributes[k].normal, normal, sizeof(normal));
+        }
+        for (size_t target = 0; target < p->target_count; target++) {
+            scene_morph *const morphs = p->morphs + target * p->vertex_count;
+            float change[3];
+            flat_normal(p, i, morphs, change);
+            subtract(change, normal, change);
+            for (uint32_t k = i; k < i + 3; k++) {
+                memcpy(morphs[k].normal, change, sizeof(change));
+            }
+        }
+    }
 }
 
 // Normals without direction become the mean of their triangles' normals; the others become unit vectors.
@@ -205,6 +287,14 @@ static void vertices_renumber(gltf_primitive *p)
     meshopt_remapIndexBuffer(p->indices, p->indices, p->index_count, remap);
     meshopt_remapVertexBuffer(p->positions, p->positions, p->vertex_count, sizeof(*p->positions), remap);
     meshopt_remapVertexBuffer(p->attributes, p->attributes, p->vertex_count, sizeof(*p->attributes), remap);
+    if (p->influences) {
+        meshopt_remapVertexBuffer(p->influences, p->influences, p->vertex_count, sizeof(*p->influences), remap);
+    }
+    for (size_t target = 0; target < p->target_count; target++) {
+        scene_morph *const morphs = p->morphs + target * p->vertex_count;
+        meshopt_remapVertexBuffer(morphs, morphs, p->vertex_count, sizeof(*morphs), remap);
+        memmove(p->morphs + target * used, morphs, used * sizeof(*morphs));
+    }
     p->vertex_count = (uint32_t)used;
     free(remap);
 }
@@ -301,7 +391,34 @@ static void primitives_concatenate(scene_data *scene, const gltf_primitive *sour
     }
 }
 
-static void matrix_multiply(const float a[16], const float b[16], float out[16])
+// Which vertices it deforms, and how.
+static void deformation_finish(scene_data *scene, scene_deformation *deformation, const gltf_primitive *sources)
+{
+    const scene_mesh *const mesh = &scene->meshes[deformation->mesh];
+    const mesh_primitive *const primitives = scene->primitives + mesh->first_primitive;
+    deformation->first_vertex = primitives[0].first_vertex;
+    for (uint32_t i = 0; i < mesh->primitive_count; i++) {
+        deformation->vertex_count += primitives[i].vertex_count;
+    }
+    const size_t all = deformation->vertex_count;
+    scene_influences *const influences =
+        deformation->skin == SCENE_NONE ? NULL : arena_alloc(&scene->arena, all * sizeof(*influences));
+    scene_morph *const morphs = arena_alloc(&scene->arena, deformation->target_count * all * sizeof(*morphs));
+    for (uint32_t i = 0; i < mesh->primitive_count; i++) {
+        const gltf_primitive *const source = &sources[mesh->first_primitive + i];
+        const size_t first = primitives[i].first_vertex - deformation->first_vertex, count = source->vertex_count;
+        if (influences) {
+            memcpy(influences + first, source->influences, count * sizeof(*influences));
+        }
+        for (size_t target = 0; target < deformation->target_count; target++) {
+            memcpy(morphs + target * all + first, source->morphs + target * count, count * sizeof(*morphs));
+        }
+    }
+    deformation->influences = influences;
+    deformation->morphs = morphs;
+}
+
+void scene_matrix_multiply(const float a[16], const float b[16], float out[16])
 {
     for (int column = 0; column < 4; column++) {
         for (int row = 0; row < 4; row++) {
@@ -312,6 +429,25 @@ static void matrix_multiply(const float a[16], const float b[16], float out[16])
             out[4 * column + row] = sum;
         }
     }
+}
+
+// Columns: the rotation's, scaled; then the translation.
+void scene_matrix_compose(const float translation[3], const float rotation[4], const float scale[3], float out[16])
+{
+    const float x = rotation[0], y = rotation[1], z = rotation[2], w = rotation[3];
+    const float columns[3][3] = {
+        {1 - 2 * (y * y + z * z), 2 * (x * y + z * w), 2 * (x * z - y * w)},
+        {2 * (x * y - z * w), 1 - 2 * (x * x + z * z), 2 * (y * z + x * w)},
+        {2 * (x * z + y * w), 2 * (y * z - x * w), 1 - 2 * (x * x + y * y)},
+    };
+    for (int column = 0; column < 3; column++) {
+        for (int row = 0; row < 3; row++) {
+            out[4 * column + row] = columns[column][row] * scale[column];
+        }
+        out[4 * column + 3] = 0;
+        out[12 + column] = translation[column];
+    }
+    out[15] = 1;
 }
 
 static bool matrix_is_finite(const float m[16])
@@ -331,7 +467,7 @@ static bool nodes_place(scene_data *scene)
         if (node->parent == SCENE_NONE) {
             memcpy(node->world, node->matrix, sizeof(node->world));
         } else {
-            matrix_multiply(scene->nodes[node->parent].world, node->matrix, node->world);
+            scene_matrix_multiply(scene->nodes[node->parent].world, node->matrix, node->world);
         }
         if (!matrix_is_finite(node->world)) {
             log_error("\"%s\": the place of node \"%s\" in the world is not finite", scene->path, node->name);
@@ -340,6 +476,26 @@ static bool nodes_place(scene_data *scene)
     }
     return true;
 }
+
+// Joint matrices at rest.
+static bool skins_place(const scene_data *scene)
+{
+    for (uint32_t i = 0; i < scene->skin_count; i++) {
+        const scene_skin *const skin = &scene->skins[i];
+        for (uint32_t k = 0; k < skin->joint_count; k++) {
+            float matrix[16];
+            scene_matrix_multiply(scene->nodes[skin->joints[k]].world, skin->inverse_bind[k], matrix);
+            if (!matrix_is_finite(matrix)) {
+                log_error("\"%s\": joint %u of skin \"%s\" moves vertices to where is not finite", scene->path, k,
+                          skin->name);
+                return false;
+            }
+        }
+    }
+    return true;
+}
+
+// ---- Bounds
 
 typedef struct box {
     float min[3], max[3];
@@ -353,18 +509,6 @@ static void box_add_point(box *b, const float p[3])
         b->min[i] = fminf(b->min[i], p[i]);
         b->max[i] = fmaxf(b->max[i], p[i]);
     }
-}
-
-static box mesh_box(const scene_data *scene, const scene_mesh *mesh)
-{
-    box result = box_empty;
-    for (uint32_t i = 0; i < mesh->primitive_count; i++) {
-        const mesh_primitive *const p = &scene->primitives[mesh->first_primitive + i];
-        for (uint32_t k = 0; k < p->vertex_count; k++) {
-            box_add_point(&result, scene->positions[p->first_vertex + k]);
-        }
-    }
-    return result;
 }
 
 static void box_add_transformed(box *bounds, const box *local, const float world[16])
@@ -388,6 +532,52 @@ static uint64_t mesh_triangle_count(const scene_data *scene, const scene_mesh *m
     return count;
 }
 
+static box mesh_box(const scene_data *scene, const scene_mesh *mesh)
+{
+    box result = box_empty;
+    for (uint32_t i = 0; i < mesh->primitive_count; i++) {
+        const mesh_primitive *const p = &scene->primitives[mesh->first_primitive + i];
+        for (uint32_t k = 0; k < p->vertex_count; k++) {
+            box_add_point(&result, scene->positions[p->first_vertex + k]);
+        }
+    }
+    return result;
+}
+
+static void matrix_point(const float m[16], const float in[3], float out[3])
+{
+    for (int row = 0; row < 3; row++) {
+        out[row] = m[row] * in[0] + m[4 + row] * in[1] + m[8 + row] * in[2] + m[12 + row];
+    }
+}
+
+// At rest, in the world. A skinned vertex lies between the places that each of its joints alone would take it to.
+static void box_add_deformed(box *bounds, const scene_data *scene, const scene_deformation *deformation)
+{
+    const scene_skin *const skin = deformation->skin == SCENE_NONE ? NULL : &scene->skins[deformation->skin];
+    for (uint32_t i = 0; i < deformation->vertex_count; i++) {
+        float position[3], world[3];
+        memcpy(position, scene->positions[deformation->first_vertex + i], sizeof(position));
+        for (size_t target = 0; target < deformation->target_count; target++) {
+            add_scaled(position, deformation->morphs[target * deformation->vertex_count + i].position,
+                       deformation->weights[target]);
+        }
+        if (!skin) {
+            matrix_point(scene->nodes[deformation->node].world, position, world);
+            box_add_point(bounds, world);
+            continue;
+        }
+        const scene_influences *const influences = &deformation->influences[i];
+        for (int k = 0; k < SCENE_INFLUENCES && influences->weights[k] > 0; k++) {
+            const uint32_t joint = influences->joints[k];
+            float bound[3];
+            matrix_point(skin->inverse_bind[joint], position, bound);
+            matrix_point(scene->nodes[skin->joints[joint]].world, bound, world);
+            box_add_point(bounds, world);
+        }
+    }
+}
+
 static void instances_bound(scene_data *scene)
 {
     box *const boxes = memory_alloc(scene->mesh_count * sizeof(*boxes));
@@ -399,10 +589,16 @@ static void instances_bound(scene_data *scene)
     box bounds = box_empty;
     for (uint32_t i = 0; i < scene->node_count; i++) {
         const scene_node *const node = &scene->nodes[i];
-        if (node->mesh != SCENE_NONE && counts[node->mesh] > 0) {
-            box_add_transformed(&bounds, &boxes[node->mesh], node->world);
-            scene->instanced_triangles += counts[node->mesh];
+        if (node->mesh == SCENE_NONE || counts[node->mesh] == 0) {
+            continue;
         }
+        const uint32_t deformation = scene->meshes[node->mesh].deformation;
+        if (deformation == SCENE_NONE) {
+            box_add_transformed(&bounds, &boxes[node->mesh], node->world);
+        } else {
+            box_add_deformed(&bounds, scene, &scene->deformations[deformation]);
+        }
+        scene->instanced_triangles += counts[node->mesh];
     }
     if (scene->instanced_triangles > 0) {
         memcpy(scene->bounds_min, bounds.min, sizeof(bounds.min));
@@ -422,11 +618,14 @@ scene_data *scene_load(const char *path)
     }
     primitives_finish(scene, primitives);
     primitives_concatenate(scene, primitives);
+    for (uint32_t i = 0; i < scene->deformation_count; i++) {
+        deformation_finish(scene, &scene->deformations[i], primitives);
+    }
     for (uint32_t i = 0; i < scene->primitive_count; i++) {
         gltf_primitive_free(&primitives[i]);
     }
     free(primitives);
-    if (!nodes_place(scene)) {
+    if (!nodes_place(scene) || !skins_place(scene)) {
         goto fail;
     }
     instances_bound(scene);
@@ -514,6 +713,26 @@ static void print_cameras(const scene_data *scene, FILE *out)
     }
 }
 
+static void print_motion(const scene_data *scene, FILE *out)
+{
+    fprintf(out, "animations: %u\n", scene->animation_count);
+    for (uint32_t i = 0; i < scene->animation_count; i++) {
+        const scene_animation *const animation = &scene->animations[i];
+        fprintf(out, "  \"%s\": %g s, %u channels\n", animation->name, animation->duration, animation->channel_count);
+    }
+    fprintf(out, "skins: %u\n", scene->skin_count);
+    for (uint32_t i = 0; i < scene->skin_count; i++) {
+        fprintf(out, "  \"%s\": %u joints\n", scene->skins[i].name, scene->skins[i].joint_count);
+    }
+    fprintf(out, "deformed meshes: %u\n", scene->deformation_count);
+    for (uint32_t i = 0; i < scene->deformation_count; i++) {
+        const scene_deformation *const deformation = &scene->deformations[i];
+        fprintf(out, "  \"%s\" of node \"%s\": %u vertices, %s, %u morph targets\n",
+                scene->meshes[deformation->mesh].name, scene->nodes[deformation->node].name, deformation->vertex_count,
+                deformation->skin == SCENE_NONE ? "no skin" : "a skin", deformation->target_count);
+    }
+}
+
 void scene_print_info(const scene_data *scene, FILE *out)
 {
     uint32_t instances = 0;
@@ -529,7 +748,7 @@ void scene_print_info(const scene_data *scene, FILE *out)
     fprintf(out, "textures: %u (%u images)\n", scene->texture_count, scene->image_count);
     print_lights(scene, out);
     print_emissive_materials(scene, out);
-    fprintf(out, "animations: %u\nskins: %u\n", scene->animation_count, scene->skin_count);
+    print_motion(scene, out);
     print_cameras(scene, out);
     fprintf(out, "bounds: %g %g %g to %g %g %g m\n", scene->bounds_min[0], scene->bounds_min[1], scene->bounds_min[2],
             scene->bounds_max[0], scene->bounds_max[1], scene->bounds_max[2]);

@@ -95,6 +95,10 @@ typedef struct scene_animation {
     float duration; // seconds: the last key's time
 } scene_animation;
 
+typedef struct scene_emission { // of a material, whose `emissive` is the product
+    float factor[3], strength;
+} scene_emission;
+
 typedef struct scene_image {
     const char *name;
     uint32_t width, height;
@@ -112,7 +116,7 @@ typedef struct scene_light { // KHR_lights_punctual; the node gives position and
     const char *name;
     uint32_t type; // LIGHT_*
     float color[3]; // linear, times intensity: candela, or lux for directional
-    float intensity; // that is in it
+    float hue[3], intensity; // whose product it is
     float inner_cone, outer_cone; // radians
 } scene_light;
 
@@ -138,6 +142,7 @@ typedef struct scene_data {
     uint32_t index_count;
     material *materials; // the last one is glTF's default material
     const char **material_names;
+    scene_emission *emissions; // per material; may be NULL where none is animated
     uint32_t material_count;
     scene_image *images;
     uint32_t image_count;
@@ -173,6 +178,10 @@ void scene_destroy(scene_data *scene); // accepts NULL
 // (halves of n/2, axis by the surface area heuristic), so that drivers that build BVHs by halving the list as given
 // build good ones. O(n log n); the same on every machine.
 void scene_primitive_reorder(uint32_t *indices, uint32_t index_count, const float (*positions)[3]);
+
+// The matrices of nodes: column-major; the rotation is a unit quaternion x y z w.
+void scene_matrix_multiply(const float a[16], const float b[16], float out[16]); // `out` may be neither
+void scene_matrix_compose(const float translation[3], const float rotation[4], const float scale[3], float out[16]);
 
 // What `lanternfield info` prints.
 void scene_print_info(const scene_data *scene, FILE *out);

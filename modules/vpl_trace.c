@@ -2,7 +2,7 @@
 // rays are one batch, and each bounce makes of a batch's hits the next.
 //
 // VPLs stay from frame to frame. A path is traced again when its source changed, or when one of its segments meets the
-// box of a surface that came, went or moved; so the slots of all others are what tracing them again would make, to the
+// box of a surface that came, went, moved or changed its colour; so the slots of all others are what tracing them again would make, to the
 // bit. (But where two instances' surfaces coincide: there it is the order of traversal that chooses.)
 #include "modules.h"
 #include "rays.h"

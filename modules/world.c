@@ -46,11 +46,27 @@ void *world_buffer_reserve(renderer *r, gpu_buffer *buffer, const char *name, ui
 
 // ---- Entities
 
+static void weights_spawn(renderer *r, const scene_deformation *d)
+{
+    if (d->target_count == 0)
+        return;
+    const size_t size = d->target_count * sizeof(float);
+    weights_component *weights = ecs_add(r->world, r->gpu_world->node_entities[d->node], r->gpu_world->weights);
+    *weights = (weights_component){memory_alloc(size), d->target_count};
+    memcpy(weights->weights, d->weights, size);
+}
+
+static void weights_fini(void *component, void *user)
+{
+    (void)user;
+    free(((weights_component *)component)->weights);
+}
+
 static void scene_spawn(renderer *r)
 {
     const scene_data *s = r->scene;
-    const world_gpu *w = r->gpu_world;
-    entity *entities = memory_alloc(max_u32(s->node_count, 1) * sizeof *entities);
+    world_gpu *w = r->gpu_world;
+    entity *entities = w->node_entities = memory_alloc(max_u32(s->node_count, 1) * sizeof *entities);
     for (uint32_t i = 0; i < s->node_count; i++) {
         const scene_node *source = &s->nodes[i];
         entities[i] = ecs_entity_create(r->world);
@@ -69,7 +85,8 @@ static void scene_spawn(renderer *r)
             light->outer_cone = from->outer_cone;
         }
     }
-    free(entities);
+    for (uint32_t i = 0; i < s->deformation_count; i++)
+        weights_spawn(r, &s->deformations[i]);
 }
 
 entity world_sun_add(renderer *r, const float direction[3], float lux)
@@ -415,6 +432,27 @@ static void boxes_move(renderer *r)
     }
 }
 
+// Of the primitives whose base colour, and with it what they reflect and let pass, changed.
+static void boxes_recolor(renderer *r)
+{
+    world_gpu *w = r->gpu_world;
+    for (uint32_t i = 0; i < w->instance_count; i++) {
+        const mesh_instance_gpu *instance = &w->instance_data[i];
+        float matrix[16] = {0};
+        for (int row = 0; row < 3; row++)
+            for (int k = 0; k < 4; k++)
+                matrix[4 * k + row] = instance->world[row][k];
+        for (uint32_t k = 0; k < instance->primitive_count; k++) {
+            const uint32_t primitive = instance->first_primitive + k;
+            if (!(world_material_changes(r, r->scene->primitives[primitive].material) & MATERIAL_COLOR_CHANGED))
+                continue;
+            box b = box_empty;
+            box_add_transformed(&b, &w->primitive_boxes[primitive], matrix);
+            changed_add(w, &b);
+        }
+    }
+}
+
 // `listed`: others than the `last_count` instances of the last frame are listed.
 static void boxes_extract(renderer *r, bool listed, uint32_t last_count)
 {
@@ -422,6 +460,8 @@ static void boxes_extract(renderer *r, bool listed, uint32_t last_count)
     if (listed)
         boxes_make(r, last_count);
     boxes_move(r);
+    if (world_materials_changes(r) & MATERIAL_COLOR_CHANGED)
+        boxes_recolor(r);
 }
 
 static void bounds_extract(renderer *r)
@@ -442,6 +482,17 @@ static void bounds_extract(renderer *r)
     c->scene_radius = fmaxf(0.5f * glm_vec3_distance(b.min, b.max), FLT_MIN);
 }
 
+static void meshes_find_emitters(renderer *r)
+{
+    const scene_data *s = r->scene;
+    bool *emits = r->gpu_world->state->mesh_emits;
+    for (uint32_t i = 0; i < s->mesh_count; i++) {
+        emits[i] = false;
+        for (uint32_t k = 0; k < s->meshes[i].primitive_count; k++)
+            emits[i] |= world_material_emits(r, s->primitives[s->meshes[i].first_primitive + k].material);
+    }
+}
+
 static void world_extract(ecs_world *world, void *user)
 {
     (void)world;
@@ -450,13 +501,17 @@ static void world_extract(ecs_world *world, void *user)
     const bool listed = instances_find(r);
     if (listed)
         instances_order(r);
-    bool emitter_moved = listed;
-    r->failed |= !instances_write(r, &emitter_moved);
+    const bool emission_changed = world_materials_changes(r) & MATERIAL_EMISSION_CHANGED;
+    if (emission_changed)
+        meshes_find_emitters(r);
+    bool emitter_moved = listed || emission_changed;
+    r->failed |= !world_materials_extract(r) || !instances_write(r, &emitter_moved);
     if (r->failed)
         return;
     boxes_extract(r, listed, last_count);
     bounds_extract(r);
     r->failed |= !world_lights_extract(r, emitter_moved);
+    world_materials_rest(r);
 }
 
 // ---- Life
@@ -472,19 +527,10 @@ static void components_register(renderer *r)
         {&w->transform, {.name = "transform", .size = sizeof(transform_component)}},
         {&w->mesh, {.name = "mesh", .size = sizeof(mesh_component)}},
         {&w->light, {.name = "light", .size = sizeof(light_component)}},
+        {&w->weights, {.name = "weights", .size = sizeof(weights_component), .fini = weights_fini}},
     };
     for (size_t i = 0; i < countof(types); i++)
         *types[i].type = ecs_component_register(r->world, &types[i].desc);
-}
-
-static void meshes_find_emitters(renderer *r)
-{
-    const scene_data *s = r->scene;
-    bool *emits = memory_alloc(max_u32(s->mesh_count, 1) * sizeof *emits);
-    for (uint32_t i = 0; i < s->mesh_count; i++)
-        for (uint32_t k = 0; k < s->meshes[i].primitive_count; k++)
-            emits[i] |= world_material_emits(r, s->primitives[s->meshes[i].first_primitive + k].material);
-    r->gpu_world->state->mesh_emits = emits;
 }
 
 bool world_init(renderer *r)
@@ -492,6 +538,8 @@ bool world_init(renderer *r)
     world_gpu *w = r->gpu_world = memory_alloc(sizeof *w);
     w->state = memory_alloc(sizeof *w->state);
     components_register(r);
+    world_materials_init(r);
+    w->state->mesh_emits = memory_alloc(max_u32(r->scene->mesh_count, 1) * sizeof(bool));
     meshes_find_emitters(r);
     scene_spawn(r);
     const ecs_system_desc transforms = {
@@ -509,6 +557,7 @@ void world_fini(renderer *r)
     if (!w)
         return;
     world_lights_fini(r);
+    world_materials_fini(r);
     const gpu_buffer buffers[] = {w->frame,      w->positions, w->attributes,    w->indices,
                                   w->primitives, w->instances, w->materials,     w->lights,
                                   w->emitters,   w->light_cdf, w->tlas_instances};
@@ -521,6 +570,7 @@ void world_fini(renderer *r)
     free(w->blas);
     free(w->textures);
     free(w->primitive_boxes);
+    free(w->node_entities);
     free(w->order);
     free(w->instance_data);
     free(w->state->listed);

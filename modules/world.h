@@ -24,6 +24,12 @@ typedef struct light_component { // "light": a punctual light at the entity's tr
     float inner_cone, outer_cone; // radians
 } light_component;
 
+// "weights": of the morph targets of the node's mesh; on each node whose mesh has any
+typedef struct weights_component {
+    float *weights; // [count]; owned by the component
+    uint32_t count;
+} weights_component;
+
 typedef struct box {
     float min[3], max[3]; // min > max: empty
 } box;
@@ -38,11 +44,14 @@ typedef struct world_source {
     float power; // as world_element_power, their sum
 } world_source;
 
-// What is not as it was in the last frame; all of it in the first. Geometry, materials and textures never change.
+// What is not as it was in the last frame; all of it in the first. Geometry and textures never change, nor does of
+// materials anything but their colours.
 typedef struct world_changes {
     bool bounds; // the constants' scene_min, scene_max and scene_radius
     bool sources; // one changed, came, went or was numbered anew
-    const box *boxes; // world: what the instances that moved, came or went cover, and what they covered
+    // World: what the instances that moved, came or went cover, and what they covered; and what the primitives cover
+    // whose base colour changed. Emission is a matter of the sources.
+    const box *boxes;
     uint32_t box_count;
 } world_changes;
 
@@ -53,7 +62,9 @@ typedef struct world_instance {
 } world_instance;
 
 typedef struct world_gpu {
-    component_type node, transform, mesh, light;
+    component_type node, transform, mesh, light, weights;
+    entity *node_entities; // [node_count]: what the scene's nodes were spawned as
+    material *material_data; // [material_count]: the scene's, with this frame's colours; see world_material_set
     // Where the device is a CPU, `positions` and `indices` are mapped, for Embree.
     gpu_buffer frame, positions, attributes, indices, primitives, instances, materials, lights, emitters, light_cdf;
     gpu_buffer tlas_instances; // VkAccelerationStructureInstanceKHR[instance_count], host
@@ -74,6 +85,7 @@ typedef struct world_gpu {
     world_instance *order; // instance_count, in the order of the TLAS
     mesh_instance_gpu *instance_data; // the same order
     struct world_state *state; // private to world.c
+    struct world_materials *material_state; // private to world_materials.c
     struct world_lights *light_state; // private to world_lights.c
 } world_gpu;
 
@@ -84,13 +96,24 @@ void world_fini(renderer *r);
 // Adds a directional light entity that travels along `direction` with `lux` (white).
 entity world_sun_add(renderer *r, const float direction[3], float lux);
 
+// Gives a material of the scene other colours: linear base colour with alpha (0 to 1), emission in nits (0 to 1e30).
+void world_material_set(renderer *r, uint32_t index, const float base_color[4], const float emissive[3]);
+
 // Luminous flux of a light source's element, as `light_power`.
 float world_element_power(const renderer *r, uint32_t element);
 
 // ---- Between the world's files.
-bool world_upload(renderer *r); // world_upload.c: what never changes
+bool world_upload(renderer *r); // world_upload.c: what never changes, and materials at first
+// world_materials.c: before all else; at the start and at the end of each extraction.
+enum { MATERIAL_COLOR_CHANGED = 1, MATERIAL_EMISSION_CHANGED = 2 };
+void world_materials_init(renderer *r);
+bool world_materials_extract(renderer *r); // false: no memory
+void world_materials_rest(renderer *r);
+void world_materials_fini(renderer *r);
+uint8_t world_material_changes(const renderer *r, uint32_t index); // MATERIAL_*_CHANGED, since the last frame
+uint8_t world_materials_changes(const renderer *r); // of any of them
 // world_lights.c: punctual lights, emissive triangles and the choice among them. Emitters are gathered anew when
-// `moved`, that is when an instance with an emissive material moved, or any instance came or went.
+// `moved`, that is when an instance with an emissive material moved, any instance came or went, or emission changed.
 bool world_lights_init(renderer *r);
 bool world_lights_extract(renderer *r, bool moved);
 void world_lights_fini(renderer *r);

@@ -29,7 +29,8 @@ typedef struct source_list {
 } source_list;
 
 struct world_lights {
-    float (**triangle_emission)[3]; // per primitive with an emissive texture: each triangle's mean, nits; else NULL
+    // Per primitive with an emissive texture that has emitted: each triangle's mean of the texture; else NULL.
+    float (**texture_means)[3];
     // Each with that of the last frame. Emitters change places when they are gathered anew only.
     punctual_list punctual, last_punctual;
     emitter_list emitters, last_emitters;
@@ -43,8 +44,7 @@ static float luminance(const float color[3])
 
 bool world_material_emits(const renderer *r, uint32_t index)
 {
-    const material *m = &r->scene->materials[index];
-    return luminance(m->emissive) > 0;
+    return luminance(r->gpu_world->material_data[index].emissive) > 0;
 }
 
 // ---- Mean emission of textured triangles
@@ -88,10 +88,10 @@ static void emissive_uvs(const scene_data *s, const material *m, const uint32_t 
 }
 
 // NULL when the primitive's emission does not vary.
-static float (*primitive_emission(const scene_data *s, const mesh_primitive *p))[3]
+static float (*texture_means_make(const scene_data *s, const mesh_primitive *p))[3]
 {
     const material *m = &s->materials[p->material];
-    if (luminance(m->emissive) <= 0 || m->emissive_texture.texture == TEXTURE_NONE)
+    if (m->emissive_texture.texture == TEXTURE_NONE)
         return NULL;
     const scene_texture *texture = &s->textures[m->emissive_texture.texture];
     if (!s->images[texture->image].texels)
@@ -107,9 +107,17 @@ static float (*primitive_emission(const scene_data *s, const mesh_primitive *p))
         triangle_vertices(s, p, t, vertices);
         emissive_uvs(s, m, vertices, uv);
         texture_mean(s, texture, decode, (const float(*)[2])uv, means[t]);
-        glm_vec3_mul(means[t], (float *)m->emissive, means[t]);
     }
     return means;
+}
+
+// Of a primitive that emits, made when it first does.
+static float (*texture_means_of(const renderer *r, uint32_t primitive))[3]
+{
+    float(**means)[3] = &r->gpu_world->light_state->texture_means[primitive];
+    if (!*means)
+        *means = texture_means_make(r->scene, &r->scene->primitives[primitive]);
+    return *means;
 }
 
 // ---- Emissive triangles
@@ -158,13 +166,16 @@ static uint32_t emitters_append(const renderer *r, uint32_t index, uint32_t geom
     const mesh_instance_gpu *instance = &r->gpu_world->instance_data[index];
     const uint32_t primitive = instance->first_primitive + geometry;
     const mesh_primitive *p = &s->primitives[primitive];
-    float(*means)[3] = r->gpu_world->light_state->triangle_emission[primitive];
+    const float *emissive = r->gpu_world->material_data[p->material].emissive;
+    float(*means)[3] = texture_means_of(r, primitive);
     uint32_t count = 0;
     for (uint32_t t = 0; t < p->index_count / 3; t++) {
         emissive_triangle emitter = {.textured = means != NULL, .instance = index, .geometry = geometry, .triangle = t};
         uint32_t vertices[3];
         triangle_vertices(s, p, t, vertices);
-        memcpy(emitter.emission, means ? means[t] : s->materials[p->material].emissive, sizeof emitter.emission);
+        memcpy(emitter.emission, emissive, sizeof emitter.emission);
+        if (means)
+            glm_vec3_mul(means[t], emitter.emission, emitter.emission);
         if (!(luminance(emitter.emission) > 0) || !emitter_place(s, instance, p, vertices, &emitter))
             continue;
         powers[count] = GLM_PIf * luminance(emitter.emission) * emitter.area * (emitter.two_sided ? 2 : 1);
@@ -416,9 +427,10 @@ bool world_lights_init(renderer *r)
 {
     const scene_data *s = r->scene;
     struct world_lights *state = r->gpu_world->light_state = memory_alloc(sizeof *state);
-    state->triangle_emission = memory_alloc(max_u32(s->primitive_count, 1) * sizeof *state->triangle_emission);
+    state->texture_means = memory_alloc(max_u32(s->primitive_count, 1) * sizeof *state->texture_means);
     for (uint32_t i = 0; i < s->primitive_count; i++)
-        state->triangle_emission[i] = primitive_emission(s, &s->primitives[i]);
+        if (world_material_emits(r, s->primitives[i].material))
+            texture_means_of(r, i);
     return emitters_gather(r) && lights_gather(r) && distribution_write(r); // all empty: no transforms yet
 }
 
@@ -428,8 +440,8 @@ void world_lights_fini(renderer *r)
     if (!state)
         return;
     for (uint32_t i = 0; i < r->scene->primitive_count; i++)
-        free(state->triangle_emission[i]);
-    free(state->triangle_emission);
+        free(state->texture_means[i]);
+    free(state->texture_means);
     const punctual_list *punctual[] = {&state->punctual, &state->last_punctual};
     const emitter_list *emitters[] = {&state->emitters, &state->last_emitters};
     for (size_t i = 0; i < 2; i++) {

@@ -1,4 +1,5 @@
-// What of the scene never changes, on the GPU: geometry, materials, textures and bottom-level acceleration structures.
+// What of the scene never changes, on the GPU: geometry, textures and bottom-level acceleration structures; and
+// materials as they are at first.
 #include "world.h"
 
 #include <float.h>

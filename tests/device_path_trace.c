@@ -234,9 +234,10 @@ static void sphere_init(sphere_scene *s, float radius, float albedo)
                              .emissive_texture = none,
                              .normal_texture = none,
                              .metallic_roughness_texture = none};
-    s->node = (scene_node){.name = "sphere", .parent = SCENE_NONE, .camera = SCENE_NONE, .light = SCENE_NONE};
+    s->node = (scene_node){
+        .name = "sphere", .parent = SCENE_NONE, .camera = SCENE_NONE, .light = SCENE_NONE, .skin = SCENE_NONE};
     memcpy(s->node.matrix, IDENTITY, sizeof s->node.matrix);
-    s->mesh = (scene_mesh){.primitive_count = 1};
+    s->mesh = (scene_mesh){.primitive_count = 1, .deformation = SCENE_NONE};
     s->primitive = (mesh_primitive){.index_count = count, .vertex_count = (RINGS + 1) * SECTORS};
     scene_primitive_reorder(s->indices, count, (const float(*)[3])s->positions);
     s->data = (scene_data){

@@ -157,6 +157,25 @@ static void thing_change(pair *p)
     }
 }
 
+// A surface gets another colour, or a lamp another brightness; now and then a surface begins to glow a little, or ends.
+static void material_change(pair *p)
+{
+    const uint32_t index = random_below(p, p->scene->material_count), what = random_below(p, 3);
+    const material *at_rest = &p->scene->materials[index];
+    float color[4], glow[3];
+    memcpy(color, p->kept->gpu_world->material_data[index].base_color, sizeof color);
+    memcpy(glow, p->kept->gpu_world->material_data[index].emissive, sizeof glow);
+    for (int k = 0; k < 3 && what == 0; k++)
+        color[k] = 0.1f + 0.8f * random_float(p);
+    const float share = what == 0 ? 0 : what == 1 ? 0.5f + random_float(p) : (float)random_below(p, 2);
+    for (int k = 0; k < 3 && what > 0; k++)
+        glow[k] = at_rest->emissive[k] > 0 ? fmaxf(share, 0.5f) * at_rest->emissive[k]
+                  : what == 2              ? 0.1f * share
+                                           : glow[k];
+    BOTH(p, r)
+    world_material_set(r, index, color, glow);
+}
+
 // ---- What a frame made
 
 static vpl *vpls_read(renderer *r)
@@ -253,6 +272,33 @@ TEST(changes_make_what_tracing_everything_makes)
     check_random_changes(SCENES "cornell.glb", RAYS_QUERY, 3000, 60);
 }
 
+static void check_random_colors(const char *scene, uint32_t rays, uint32_t vpls)
+{
+    enum { FRAMES = 40 };
+    pair p = pair_create(scene, rays, vpls);
+    tally t = {0};
+    frame_check(&p, &t);
+    p.power = p.kept->gpu_world->light_power;
+    for (uint32_t frame = 0; frame < FRAMES; frame++) {
+        frame_check(&p, &t);
+        if (frame % 5 != 1)
+            material_change(&p);
+        if (frame % 7 == 3)
+            thing_change(&p);
+    }
+    printf("  %s: %u frames all, %u some, %u none\n", scene, t.frames[VPLS_ALL], t.frames[VPLS_SOME],
+           t.frames[VPLS_NONE]);
+    CHECK(t.frames[VPLS_SOME] > FRAMES / 4 && t.frames[VPLS_NONE] > 0);
+    pair_destroy(&p);
+}
+
+TEST(colors_and_emission_that_change_make_what_tracing_everything_makes)
+{
+    check_random_colors(SCENES "cornell.glb", RAYS_QUERY, 3000);
+    check_random_colors(SCENES "two_rooms.glb", RAYS_AUTO, 5000);
+    check_random_colors(SCENES "atrium.glb", RAYS_AUTO, 5000);
+}
+
 TEST(settings_trace_everything_anew)
 {
     pair p = pair_create(SCENES "cornell.glb", RAYS_AUTO, 2000);
@@ -319,6 +365,7 @@ int main(void)
         }
     }
     RUN(changes_make_what_tracing_everything_makes);
+    RUN(colors_and_emission_that_change_make_what_tracing_everything_makes);
     RUN(settings_trace_everything_anew);
     RUN(a_light_that_moves_takes_its_own_paths_only);
     RUN(the_validation_layer_has_nothing_to_say);

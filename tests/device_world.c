@@ -293,6 +293,73 @@ TEST(changes_are_what_changed)
     renderer_destroy(r);
 }
 
+static bool same_bytes_on_gpu(const renderer *r)
+{
+    material read[QUADS_MAX];
+    const size_t size = r->scene->material_count * sizeof *read;
+    return gpu_buffer_read(device, r->gpu_world->materials, 0, read, size) &&
+           memcmp(read, r->gpu_world->material_data, size) == 0;
+}
+
+TEST(materials_that_change_are_uploaded_and_told)
+{
+    quad_scene s;
+    quad_scene_init(&s);
+    float matrix[16];
+    matrix_at(matrix, 100, 100, 100);
+    emissive_quad_add(&s, matrix, 1);
+    matrix_at(matrix, -100, -100, -100);
+    quad_add(&s, matrix);
+    matrix_at(matrix, 5, 0, 0);
+    quad_add(&s, matrix);
+    renderer *r = renderer_of(&s);
+    const world_changes *changes = &r->gpu_world->changes;
+    CHECK(renderer_frame(r) && renderer_frame(r) && same_bytes_on_gpu(r));
+    const float power = r->gpu_world->light_power;
+
+    static const float green[4] = {0, 1, 0, 1}, dark[3] = {0}, bright[3] = {2, 2, 2};
+    world_material_set(r, 2, green, dark);
+    CHECK(renderer_frame(r) && changes->box_count == 1 && !changes->sources && !changes->bounds);
+    CHECK(changes->boxes[0].min[0] == 4 && changes->boxes[0].max[0] == 6 && same_bytes_on_gpu(r));
+    CHECK(r->gpu_world->material_data[2].base_color[1] == 1 && r->scene->materials[2].base_color[1] == 0.25f);
+    world_material_set(r, 2, green, dark); // the same
+    CHECK(renderer_frame(r) && changes->box_count == 0 && !changes->sources);
+
+    world_material_set(r, 0, s.materials[0].base_color, bright); // twice as bright
+    CHECK(renderer_frame(r) && changes->sources && changes->box_count == 0 && same_bytes_on_gpu(r));
+    check_changed_sources(r, 0, 1);
+    CHECK_NEAR(r->gpu_world->light_power, 2 * power, 1e-4 * power);
+
+    world_material_set(r, 2, green, bright); // begins to emit
+    CHECK(renderer_frame(r) && changes->sources && r->constants.emitter_count == 4);
+    check_changed_sources(r, 0, 1);
+    node_of(r, 2)->matrix[12] = 6; // and is followed
+    CHECK(renderer_frame(r) && changes->sources && emitters_of(r)[0].emission[0] == 2);
+    check_changed_sources(r, 0, 1);
+    world_material_set(r, 2, green, dark); // and ends
+    CHECK(renderer_frame(r) && changes->sources && r->constants.emitter_count == 2);
+    CHECK(renderer_frame(r) && !changes->sources && changes->box_count == 0);
+    renderer_destroy(r);
+}
+
+// Emission times the texture's mean, also of what is dark at first.
+TEST(textured_surfaces_may_begin_to_emit)
+{
+    quad_scene s;
+    quad_scene_init(&s);
+    uint8_t texels[4] = {255, 255, 255, 255};
+    texture_set(&s, texels, 1, 1, true);
+    quad_add(&s, IDENTITY)->emissive_texture.texture = 0;
+    renderer *r = renderer_of(&s);
+    CHECK(renderer_frame(r) && r->constants.emitter_count == 0);
+    static const float red[3] = {3, 0, 0};
+    world_material_set(r, 0, s.materials[0].base_color, red);
+    CHECK(renderer_frame(r) && r->constants.emitter_count == 2);
+    CHECK_NEAR(emitters_of(r)[0].emission[0], 3, 1e-5);
+    CHECK(emitters_of(r)[0].textured == 1 && emitters_of(r)[0].emission[1] == 0);
+    renderer_destroy(r);
+}
+
 TEST(spots_fall_off_between_their_cones)
 {
     quad_scene s;
@@ -331,6 +398,8 @@ int main(void)
     RUN(emitters_follow_their_instance);
     RUN(lights_share_the_choice_in_proportion_to_power);
     RUN(changes_are_what_changed);
+    RUN(materials_that_change_are_uploaded_and_told);
+    RUN(textured_surfaces_may_begin_to_emit);
     RUN(spots_fall_off_between_their_cones);
     RUN(the_validation_layer_is_silent);
     gpu_destroy(device);

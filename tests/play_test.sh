@@ -7,6 +7,7 @@ set -u
 lanternfield=$(realpath "$1")
 scenes=$(dirname "$lanternfield")/scenes
 { [ -x "$lanternfield" ] && [ -s "$scenes/door.glb" ]; } || { echo "$lanternfield or its scenes are not built"; exit 1; }
+shared=$(realpath -m ../shared)
 work=$(mktemp -d)
 trap 'cd /; rm -rf "$work"' EXIT
 mkdir "$work/here" && cd "$work/here" || exit 1
@@ -167,6 +168,22 @@ echo "references keep nothing over a frame"
 plays "$script" -o "$work/reference" --method path --spp 2 --size 32x18 --range 0:3
 plays "$script" -o "$work/reference2" --method path --spp 2 --size 32x18 --range 2:3
 cmp -s "$work/reference/frame_000002.png" "$work/reference2/frame_000002.png" || fail "the reference of frame 2 differs"
+
+echo "clips move, and nothing else does"
+truck=$shared/scenes/animated/CesiumMilkTruck/CesiumMilkTruck.gltf
+if [ -s "$truck" ]; then
+  for clips in '' '{"clip": "Wheels", "start": 0.1, "loop": true}'; do
+    printf '{"scene": "%s", "duration": 0.4, "frame_rate": 10, "lights": [{"name": "sun", "type": "directional",
+      "intensity": 50, "direction": [-1, -1, -0.5]}], "animations": [%s]}' "$truck" "$clips" >"$work/truck.json"
+    # A reference keeps nothing over a frame, so frames of a still scene are equal.
+    plays "$work/truck.json" -o "$work/truck$clips" --method path --spp 1 --size 96x54
+    pictures=$(cd "$work/truck$clips" && sha256sum frame_*.png | cut -d' ' -f1 | sort -u | wc -l)
+    # At 0 and 0.1 s the clip is at its beginning.
+    [ "$pictures" = $((${#clips} > 0 ? 3 : 1)) ] || fail "$pictures different pictures with clips \"$clips\""
+  done
+else
+  echo "skipped: clips, as there is no $truck"
+fi
 
 echo "what automatic settings chose plays to the same bytes"
 plays "$script" -o "$work/chosen" --target-ms 3 --record "$work/chosen.json"

@@ -56,10 +56,10 @@ static inline material *quad_add(quad_scene *s, const float matrix[16])
 {
     const uint32_t i = s->data.node_count;
     s->data.node_count = s->data.mesh_count = s->data.primitive_count = s->data.material_count = i + 1;
-    s->nodes[i] =
-        (scene_node){.name = "quad", .parent = SCENE_NONE, .mesh = i, .camera = SCENE_NONE, .light = SCENE_NONE};
+    s->nodes[i] = (scene_node){
+        .name = "quad", .parent = SCENE_NONE, .mesh = i, .camera = SCENE_NONE, .light = SCENE_NONE, .skin = SCENE_NONE};
     memcpy(s->nodes[i].matrix, matrix, sizeof s->nodes[i].matrix);
-    s->meshes[i] = (scene_mesh){.first_primitive = i, .primitive_count = 1};
+    s->meshes[i] = (scene_mesh){.first_primitive = i, .primitive_count = 1, .deformation = SCENE_NONE};
     s->primitives[i] = (mesh_primitive){.index_count = 6, .vertex_count = 4, .material = i};
     const texture_reference none = {.texture = TEXTURE_NONE, .transform = {1, 0, 0, 1}};
     s->materials[i] = (material){

@@ -94,6 +94,18 @@ static inline scene_data *load_members(const char *name, const void *bytes, size
     return scene_load(test_path(name));
 }
 
+// The last load must have failed with one line that holds the file's name and `thing`.
+static inline void check_refused(const char *file, int line, scene_data *scene, const char *name, const char *thing)
+{
+    const bool ok = !scene && test_log.errors == 1 && strstr(test_log.error, name) && strstr(test_log.error, thing);
+    if (!ok) {
+        test_failures++;
+        printf("%s:%d: failed: expected one error with %s and \"%s\", got %u: %s\n", file, line, name, thing,
+               test_log.errors, scene ? "(it loaded)" : test_log.error);
+    }
+    scene_destroy(scene);
+}
+
 // A right triangle in the plane z = 0 and its indices.
 typedef struct triangle_bytes {
     float positions[3][3];

@@ -3,17 +3,6 @@
 
 #include <sys/stat.h>
 
-// The last load must have failed with one line that holds the file's name and `thing`.
-static void check_refused(const char *file, int line, scene_data *scene, const char *name, const char *thing)
-{
-    const bool ok = !scene && test_log.errors == 1 && strstr(test_log.error, name) && strstr(test_log.error, thing);
-    if (!ok) {
-        test_failures++;
-        printf("%s:%d: failed: expected one error with %s and \"%s\", got %u: %s\n", file, line, name, thing,
-               test_log.errors, scene ? "(it loaded)" : test_log.error);
-    }
-    scene_destroy(scene);
-}
 #define REFUSED(members, thing) check_refused(__FILE__, __LINE__, load_triangle(members), "triangle.gltf", thing)
 #define FILE_REFUSED(name, bytes, size, thing)                                                                         \
     (test_file(name, bytes, size), log_clear(),                                                                        \
