@@ -1,4 +1,5 @@
-// Plays a script: renders its frames, with a renderer that it makes anew at every cut.
+// Plays a script: renders its frames, with a renderer that it makes anew at every cut, which takes 0.4 s of processor
+// time for a small scene on lavapipe.
 //
 //     player *p = player_create(gpu, scene, script, NULL, NULL);
 //     for (uint32_t n = playback_segment_begin(script, wanted); n <= wanted; n++)

@@ -99,6 +99,10 @@ same "$work/whole" "$work/again"
 [ "$(cd "$work/whole" && sha256sum frame_*.png | cut -d' ' -f1 | sort -u | wc -l)" -ge 58 ] ||
   fail "the frames do not differ, so nothing is shown"
 
+echo "the validation layer has nothing to say, over a cut too"
+plays "$script" -o "$work/validated" --validate --range 28:32
+cmp -s "$work/whole/frame_000031.png" "$work/validated/frame_000031.png" || fail "validated frame 31 differs"
+
 echo "a row a frame"
 [ "$(wc -l <"$work/whole.csv")" = 61 ] || fail "rows: $(wc -l <"$work/whole.csv")"
 awk -F, 'NR == 1 { columns = NF; for (i = 1; i <= NF; i++) name[$i] = i }
