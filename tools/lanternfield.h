@@ -42,6 +42,37 @@ typedef struct render_request { // strings belong to argv
 // Reads the arguments behind "render". Returns EXIT_DONE, or the exit code of an error that it has logged.
 int render_options_read(int argc, char **argv, render_request *request);
 void render_help_print(FILE *out);
+bool render_request_fits(const render_request *request); // the method can do what is asked for; else logged
+
+// ---- Options by tables: lanternfield_words.c. A command with more to be asked for has a render_request first in its
+// own.
+typedef struct command_option {
+    const char *name; // without dashes; one letter: one dash
+    const char *value_name; // NULL: takes no value
+    const char *help;
+    // `value` is NULL for those without. False: `error` says what was expected.
+    bool (*read)(render_request *request, const char *value, setting_error *error);
+} command_option;
+typedef struct option_group {
+    const char *title;
+    const command_option *options;
+    size_t count;
+} option_group;
+enum { OPTION_GROUPS_MAX = 3 };
+typedef struct command_syntax {
+    const char *command; // "render"
+    option_group groups[OPTION_GROUPS_MAX];
+    bool (*setting_read)(render_request *request, const setting_info *info, const char *value, setting_error *error);
+    bool (*word_read)(render_request *request, const char *word); // one that is no option; false: logged
+    const char *(*setting_refusal)(
+        const setting_info *info); // why it has no use here, NULL: it has; may be NULL itself
+} command_syntax;
+extern const option_group device_option_group; // of render: --device, --validate
+// Returns EXIT_DONE, or the exit code of an error that it has logged. Ends at --help, which it notes in the request.
+int command_line_read(const command_syntax *syntax, int argc, char **argv, render_request *request);
+void options_help_print(FILE *out, const command_syntax *syntax); // the groups, and all settings
+// Makes the message of `error`: "--fov: expected ..., got ...". Returns false.
+bool option_refuse(setting_error *error, const char *option, const char *expected, const char *value);
 bool path_has_extension(const char *path, const char *extension); // ".png", without regard to case
 
 // ---- The rendering: lanternfield_render.c.
@@ -56,12 +87,18 @@ typedef struct render_session {
 } render_session;
 bool render_session_open(render_session *session,
                          const render_request *request); // false: logged; close it all the same
+// The same without a renderer and without what a request says of camera and sun.
+bool render_session_prepare(render_session *session, const render_request *request);
 void render_session_close(render_session *session);
+// False, and logged, when the request asks for the validation layer and it reported anything.
+bool render_session_validated(const render_session *session, const render_request *request);
+void darkness_warn(const renderer *r); // after a frame: when there is nothing to see in it
 // Text that names all that a picture depends on: the scene by hashes of what was loaded, camera, sun, size, and those
 // settings that the method reads; for the progressive methods without what only says how long they go on. One line
 // "key value" each. Equal text, equal picture (or sums), but for rounding where another tracer is asked for. free() it.
 // lanternfield_identity.c.
 char *render_identity(const render_session *session, const render_request *request);
+void scene_identity_print(FILE *out, const scene_data *scene); // its part about the scene
 
 // ---- Progressive methods, frame by frame, with their state in a file: lanternfield_progressive.c.
 typedef struct progressive_run { // zero-initialise
@@ -91,6 +128,7 @@ bool interrupt_seen(void);
 void progress_begin(void); // from now on log lines do not run into the progress line
 void progress_show(const char *format, ...) __attribute__((format(printf, 1, 2)));
 void progress_end(void);
+void time_left_print(double seconds, char text[32]); // "  12 s left"
 
 // ---- Pictures: lanternfield_images.c.
 const struct aov_info *aov_find(const char *name); // NULL when unknown
@@ -139,5 +177,7 @@ typedef struct render_summary {
     const progressive_run *progress; // NULL: the method is none of those
     double seconds; // of all frames
 } render_summary;
+void counters_export(renderer *r); // asks the renderer to keep what the next and lights_per_pixel_mean are made from
+double rays_per_pixel(renderer *r); // of the last frame, all kinds
 void stats_export(renderer *r); // asks the renderer to keep what the statistics are made from
 bool stats_write(renderer *r, const render_summary *summary, const char *path);

@@ -132,7 +132,7 @@ static uint64_t lights_hash(const scene_data *s)
     return hash;
 }
 
-static void scene_identity_print(FILE *out, const scene_data *scene)
+void scene_identity_print(FILE *out, const scene_data *scene)
 {
     static const struct {
         const char *name;

@@ -8,26 +8,6 @@
 #include <string.h>
 #include <strings.h>
 
-// Reads one option. `value` is NULL for those without. False: `error` says what was expected.
-typedef struct command_option {
-    const char *name; // without dashes; one letter: one dash
-    const char *value_name;
-    const char *help;
-    bool (*read)(render_request *request, const char *value, setting_error *error);
-} command_option;
-
-static bool refuse(setting_error *error, const char *option, const char *expected, const char *value)
-{
-    snprintf(error->message, sizeof(error->message), "%s: expected %s, got \"%.80s\"", option, expected, value);
-    return false;
-}
-
-bool path_has_extension(const char *path, const char *extension)
-{
-    const size_t length = strlen(path), extension_length = strlen(extension);
-    return length > extension_length && strcasecmp(path + length - extension_length, extension) == 0;
-}
-
 // `count` finite numbers separated by commas, and nothing else.
 static bool numbers_read(const char *text, float *values, uint32_t count)
 {
@@ -50,10 +30,10 @@ static bool numbers_read(const char *text, float *values, uint32_t count)
 static bool output_read(render_request *request, const char *value, setting_error *error)
 {
     if (!path_has_extension(value, ".png") && !path_has_extension(value, ".exr")) {
-        return refuse(error, "-o", "a file name that ends in .png or .exr", value);
+        return option_refuse(error, "-o", "a file name that ends in .png or .exr", value);
     }
     if (request->output_count == OUTPUTS_MAX) {
-        return refuse(error, "-o", "at most 8 files", value);
+        return option_refuse(error, "-o", "at most 8 files", value);
     }
     request->outputs[request->output_count++] = value;
     return true;
@@ -63,10 +43,10 @@ static bool aov_read(render_request *request, const char *value, setting_error *
 {
     const char *const equals = strchr(value, '=');
     if (!equals || !path_has_extension(equals + 1, ".exr")) {
-        return refuse(error, "--aov", "NAME=FILE.exr", value);
+        return option_refuse(error, "--aov", "NAME=FILE.exr", value);
     }
     if (request->aov_count == AOVS_MAX) {
-        return refuse(error, "--aov", "at most 16 of these", value);
+        return option_refuse(error, "--aov", "at most 16 of these", value);
     }
     char name[32];
     snprintf(name, sizeof(name), "%.*s", (int)(equals - value), value);
@@ -74,7 +54,7 @@ static bool aov_read(render_request *request, const char *value, setting_error *
     if (!aov) {
         char expected[160] = "one of ";
         aov_names_print(expected + strlen(expected), sizeof(expected) - strlen(expected));
-        return refuse(error, "--aov", expected, name);
+        return option_refuse(error, "--aov", expected, name);
     }
     request->aovs[request->aov_count++] = (aov_request){.aov = aov, .path = equals + 1};
     return true;
@@ -90,13 +70,13 @@ static bool camera_read(render_request *request, const char *value, setting_erro
 static bool eye_read(render_request *request, const char *value, setting_error *error)
 {
     request->has_eye = true;
-    return numbers_read(value, request->eye, 3) || refuse(error, "--eye", "x,y,z in metres", value);
+    return numbers_read(value, request->eye, 3) || option_refuse(error, "--eye", "x,y,z in metres", value);
 }
 
 static bool target_read(render_request *request, const char *value, setting_error *error)
 {
     request->has_target = true;
-    return numbers_read(value, request->target, 3) || refuse(error, "--target", "x,y,z in metres", value);
+    return numbers_read(value, request->target, 3) || option_refuse(error, "--target", "x,y,z in metres", value);
 }
 
 static bool fov_read(render_request *request, const char *value, setting_error *error)
@@ -105,7 +85,7 @@ static bool fov_read(render_request *request, const char *value, setting_error *
     const bool is_number = numbers_read(value, &request->fov, 1);
     error->out_of_range = is_number;
     return (is_number && request->fov >= 1 && request->fov <= 179) ||
-           refuse(error, "--fov", "a number of degrees from 1 to 179", value);
+           option_refuse(error, "--fov", "a number of degrees from 1 to 179", value);
 }
 
 static bool sun_read(render_request *request, const char *value, setting_error *error)
@@ -115,7 +95,7 @@ static bool sun_read(render_request *request, const char *value, setting_error *
     const bool is_sun = numbers_read(value, request->sun, 4);
     error->out_of_range = is_sun;
     return (is_sun && (sun[0] != 0 || sun[1] != 0 || sun[2] != 0) && sun[3] >= 0) ||
-           refuse(error, "--sun", "dx,dy,dz,LUX with a direction that is not zero and at least 0 lux", value);
+           option_refuse(error, "--sun", "dx,dy,dz,LUX with a direction that is not zero and at least 0 lux", value);
 }
 
 static bool animation_read(render_request *request, const char *value, setting_error *error)
@@ -194,86 +174,44 @@ static const command_option device_options[] = {
      validate_read},
 };
 
-static const struct {
-    const char *title;
-    const command_option *options;
-    size_t count;
-} groups[] = {
-    {"Files", output_options, countof(output_options)},
-    {"View and light", view_options, countof(view_options)},
-    {"Device", device_options, countof(device_options)},
-};
+const option_group device_option_group = {"Device", device_options, countof(device_options)};
 
-static const command_option *command_option_find(const char *name)
+static bool setting_read(render_request *request, const setting_info *info, const char *value, setting_error *error)
 {
-    for (size_t g = 0; g < countof(groups); g++) {
-        for (size_t i = 0; i < groups[g].count; i++) {
-            if (strcmp(groups[g].options[i].name, name) == 0) {
-                return &groups[g].options[i];
-            }
-        }
+    return settings_set(&request->settings, info, value, error);
+}
+
+static bool scene_read(render_request *request, const char *word)
+{
+    const bool is_first = !request->scene;
+    if (!is_first) {
+        log_error("one SCENE is enough: \"%s\" and \"%s\"; see lanternfield render --help", request->scene, word);
     }
-    return NULL;
+    request->scene = word;
+    return is_first;
 }
 
-// ---- Help, made from the tables
-
-static void help_line_print(FILE *out, const char *name, const char *value_name, const char *text)
+static command_syntax render_syntax(void)
 {
-    char left[64];
-    snprintf(left, sizeof(left), "%s%s %s", name[1] ? "--" : "-", name, value_name);
-    // What is too wide for the left column gets a line of its own.
-    fprintf(out, strlen(left) <= 26 ? "  %-26s %s\n" : "  %s\n                             %s\n", left, text);
+    return (command_syntax){
+        .command = "render",
+        .groups = {{"Files", output_options, countof(output_options)},
+                   {"View and light", view_options, countof(view_options)},
+                   device_option_group},
+        .setting_read = setting_read,
+        .word_read = scene_read,
+    };
 }
 
-// "a|b|c"
-static void alternatives_print(const char *const *names, char *text, size_t size)
-{
-    size_t length = 0;
-    for (uint32_t i = 0; names[i]; i++) {
-        length += (size_t)snprintf(text + length, size - length, "%s%s", i ? "|" : "", names[i]);
-        assert(length < size);
-    }
-}
-
-static bool setting_is_switch(const setting_info *info)
-{
-    return info->type == SETTING_TRUE || info->type == SETTING_FALSE;
-}
-
-static void setting_help_print(FILE *out, const setting_info *info)
-{
-    char value_name[64] = "", default_text[32], text[160];
-    if (info->value_name) {
-        snprintf(value_name, sizeof(value_name), "%s", info->value_name);
-    } else if (info->type == SETTING_ENUM) {
-        alternatives_print(info->values, value_name, sizeof(value_name));
-    }
-    const render_settings defaults = render_settings_default();
-    settings_get(&defaults, info, default_text);
-    const char *const shown = setting_is_switch(info) ? "off" : default_text;
-    snprintf(text, sizeof(text), "%s (default %s)", info->help, shown);
-    help_line_print(out, info->name, value_name, text);
-}
+// ---- Help
 
 void render_help_print(FILE *out)
 {
     fputs("usage: lanternfield render SCENE [OPTION...]\n"
           "Renders a .gltf or .glb scene. Units are glTF's: metres, candela, lux, nits.\n",
           out);
-    for (size_t g = 0; g < countof(groups); g++) {
-        fprintf(out, "\n%s\n", groups[g].title);
-        for (size_t i = 0; i < groups[g].count; i++) {
-            const command_option *const option = &groups[g].options[i];
-            help_line_print(out, option->name, option->value_name ? option->value_name : "", option->help);
-        }
-    }
-    fputs("\nRendering\n", out);
-    uint32_t count;
-    const setting_info *const table = settings_table(&count);
-    for (uint32_t i = 0; i < count; i++) {
-        setting_help_print(out, &table[i]);
-    }
+    const command_syntax syntax = render_syntax();
+    options_help_print(out, &syntax);
     char names[160];
     aov_names_print(names, sizeof(names));
     fprintf(
@@ -298,65 +236,9 @@ void render_help_print(FILE *out)
 
 // ---- Reading the command line
 
-static const char usage_hint[] = "; see lanternfield render --help";
-
-// An option as it was written: "--name=value", "--name value", "-n value" or "--name".
-typedef struct option_word {
-    char name[32]; // without dashes
-    const char *written; // the whole word
-    const char *own_value; // behind '='; NULL: none
-} option_word;
-
-static option_word option_word_split(const char *word)
-{
-    const bool is_long = word[1] == '-';
-    const char *const name = word + (is_long ? 2 : 1);
-    const char *const equals = is_long ? strchr(name, '=') : NULL;
-    const size_t length = equals ? (size_t)(equals - name) : strlen(name);
-    option_word split = {.written = word, .own_value = equals ? equals + 1 : NULL};
-    // A name of the wrong length for its dashes, or longer than any, finds nothing.
-    if (is_long == (length > 1) && length < sizeof(split.name)) {
-        memcpy(split.name, name, length);
-    }
-    return split;
-}
-
-// Reads the option at argv[*i] and moves on to its value when it has one of its own.
-static int option_read(int argc, char **argv, int *i, render_request *request)
-{
-    const option_word word = option_word_split(argv[*i]);
-    const setting_info *const setting = settings_find(word.name);
-    const command_option *const option = command_option_find(word.name);
-    if (!setting && !option) {
-        log_error("unknown option %s%s", word.written, usage_hint);
-        return EXIT_WRONG_USAGE;
-    }
-
-    const bool takes_value = setting ? !setting_is_switch(setting) : option->value_name != NULL;
-    const char *value = word.own_value;
-    if (takes_value && !value) {
-        if (*i + 1 == argc) {
-            log_error("%s: its value is missing%s", word.written, usage_hint);
-            return EXIT_WRONG_USAGE;
-        }
-        value = argv[++*i];
-    }
-    if (!setting && !takes_value && value) {
-        log_error("%s: it takes no value%s", word.written, usage_hint);
-        return EXIT_WRONG_USAGE;
-    }
-
-    setting_error error = {0};
-    if (setting ? settings_set(&request->settings, setting, value, &error) : option->read(request, value, &error)) {
-        return EXIT_DONE;
-    }
-    log_error("%s%s", error.message, error.out_of_range ? "" : usage_hint);
-    return error.out_of_range ? EXIT_FAILED : EXIT_WRONG_USAGE;
-}
-
-// Whether the method can do what is asked for. Settings that it does not read are let pass, so that methods can be
-// compared by changing one word; what the user would wait for in vain is not.
-static bool request_fits_method(const render_request *request)
+// Settings that the method does not read are let pass, so that methods can be compared by changing one word; what the
+// user would wait for in vain is not.
+bool render_request_fits(const render_request *request)
 {
     const render_settings *const settings = &request->settings;
     char method[32], only[32];
@@ -407,31 +289,18 @@ int render_options_read(int argc, char **argv, render_request *request)
 {
     *request = (render_request){.settings = render_settings_default()};
     request->settings.frames = 0; // not given
-    for (int i = 0; i < argc; i++) {
-        if (strcmp(argv[i], "--help") == 0 || strcmp(argv[i], "-h") == 0) {
-            request->help = true;
-            return EXIT_DONE;
-        }
-        if (argv[i][0] != '-') {
-            if (request->scene) {
-                log_error("one SCENE is enough: \"%s\" and \"%s\"%s", request->scene, argv[i], usage_hint);
-                return EXIT_WRONG_USAGE;
-            }
-            request->scene = argv[i];
-            continue;
-        }
-        const int code = option_read(argc, argv, &i, request);
-        if (code != EXIT_DONE) {
-            return code;
-        }
+    const command_syntax syntax = render_syntax();
+    const int code = command_line_read(&syntax, argc, argv, request);
+    if (code != EXIT_DONE || request->help) {
+        return code;
     }
     if (!request->scene) {
-        log_error("render needs a SCENE%s", usage_hint);
+        log_error("render needs a SCENE; see lanternfield render --help");
         return EXIT_WRONG_USAGE;
     }
     frames_complete(&request->settings);
     if (request->output_count == 0) {
         request->outputs[request->output_count++] = "out.png";
     }
-    return request_fits_method(request) ? EXIT_DONE : EXIT_FAILED;
+    return render_request_fits(request) ? EXIT_DONE : EXIT_FAILED;
 }

@@ -50,3 +50,8 @@ void progress_end(void)
     line_clear();
     log_sink_set(NULL, NULL);
 }
+
+void time_left_print(double seconds, char text[32])
+{
+    snprintf(text, 32, seconds < 90 ? "  %.0f s left" : "  %.0f min left", seconds < 90 ? seconds : seconds / 60);
+}

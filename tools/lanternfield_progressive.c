@@ -77,14 +77,13 @@ static void progress_print(const progressive_run *run, const renderer *r)
     const progressive_status *const now = &run->now;
     const double expected = done_expected(now, (double)r->settings.until);
     const uint64_t here = now->done - run->before.done;
-    char error[32] = "", left[64] = "";
+    char error[32] = "", left[32] = "";
     if (!isnan(now->error)) {
         snprintf(error, sizeof(error), "  error %.2g %%", 100 * now->error);
     }
     if (here > 0) {
         const double seconds = (time_now() - run->start) / (double)here * fmax(0, expected - (double)now->done);
-        snprintf(left, sizeof(left), seconds < 90 ? "  %.0f s left" : "  %.0f min left",
-                 seconds < 90 ? seconds : seconds / 60);
+        time_left_print(seconds, left);
     }
     progress_show("%llu/%llu %s  %.0f %%%s%s", (unsigned long long)now->done, (unsigned long long)now->total,
                   progressive_run_unit(r, now->total),

@@ -277,24 +277,27 @@ static bool aovs_check(const render_state *state)
 
 static void progress_show_frame(uint32_t frame, uint32_t frames, double seconds_so_far)
 {
-    char left[64] = "";
+    char left[32] = "";
     if (frame > 0) {
-        const double seconds = seconds_so_far / frame * (frames - frame);
-        snprintf(left, sizeof(left), seconds < 90 ? "%.0f s left" : "%.0f min left",
-                 seconds < 90 ? seconds : seconds / 60);
+        time_left_print(seconds_so_far / frame * (frames - frame), left);
     }
-    progress_show("frame %u/%u  %.0f %%  %s", frame + 1, frames, 100.0 * frame / frames, left);
+    progress_show("frame %u/%u  %.0f %%%s", frame + 1, frames, 100.0 * frame / frames, left);
 }
 
-// Warns of a black picture, and refuses parts of the picture that are not made, before the other frames are rendered.
+void darkness_warn(const renderer *r)
+{
+    if (r->gpu_world->instance_count == 0) {
+        log_warning("%s: no geometry is in place (nodes scaled to nothing?): the picture will be black",
+                    r->scene->path);
+    } else if (r->gpu_world->light_power <= 0) {
+        log_warning("%s: no lights: the picture will be black", r->scene->path);
+    }
+}
+
+// Refuses parts of the picture that are not made, before the other frames are rendered.
 static bool first_frame_check(const render_state *state)
 {
-    if (state->session.renderer->gpu_world->instance_count == 0) {
-        log_warning("%s: no geometry is in place (nodes scaled to nothing?): the picture will be black",
-                    state->session.scene->path);
-    } else if (state->session.renderer->gpu_world->light_power <= 0) {
-        log_warning("%s: no lights: the picture will be black", state->session.scene->path);
-    }
+    darkness_warn(state->session.renderer);
     levels_check(state->session.renderer);
     return aovs_check(state);
 }
@@ -468,9 +471,9 @@ static bool outputs_write(const render_state *state)
     return ok;
 }
 
-static bool validation_check(const render_state *state)
+bool render_session_validated(const render_session *session, const render_request *request)
 {
-    const uint32_t messages = state->request->validate ? gpu_validation_messages(state->session.gpu) : 0;
+    const uint32_t messages = request->validate ? gpu_validation_messages(session->gpu) : 0;
     if (messages > 0) {
         log_error("the validation layer reported %u message%s", messages, messages == 1 ? "" : "s");
     }
@@ -479,13 +482,11 @@ static bool validation_check(const render_state *state)
 
 // ---- From nothing to a renderer
 
-bool render_session_open(render_session *session, const render_request *request)
+bool render_session_prepare(render_session *session, const render_request *request)
 {
-    uint32_t camera;
     progress_show("load %s", request->scene);
     session->scene = scene_load(request->scene);
-    if (!session->scene || !camera_find(session->scene, request->camera, &camera) ||
-        !animation_check(session->scene, request->animation)) {
+    if (!session->scene) {
         return false;
     }
     if (session->scene->instanced_triangles == 0) {
@@ -494,8 +495,15 @@ bool render_session_open(render_session *session, const render_request *request)
     }
     const gpu_desc desc = {.device = request->device, .validation = request->validate};
     session->gpu = gpu_create(&desc);
-    if (!session->gpu || !size_check(session->gpu, &request->settings) ||
-        !memory_check(session->gpu, &request->settings)) {
+    return session->gpu && size_check(session->gpu, &request->settings) &&
+           memory_check(session->gpu, &request->settings);
+}
+
+bool render_session_open(render_session *session, const render_request *request)
+{
+    uint32_t camera;
+    if (!render_session_prepare(session, request) || !camera_find(session->scene, request->camera, &camera) ||
+        !animation_check(session->scene, request->animation)) {
         return false;
     }
     progress_show("upload %s", request->scene);
@@ -547,7 +555,8 @@ int render_run(const render_request *request)
     if (ok) {
         interrupt_watch();
         exports_set(state.session.renderer, request);
-        ok = frames_render(&state) && outputs_write(&state) && validation_check(&state) && !state.progress.save_failed;
+        ok = frames_render(&state) && outputs_write(&state) && render_session_validated(&state.session, request) &&
+             !state.progress.save_failed;
     }
     progress_end();
     if (ok && interrupted) {

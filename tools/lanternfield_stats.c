@@ -160,27 +160,38 @@ static void settings_to_json(cJSON *root, const render_settings *settings)
     }
 }
 
-// Rays of the last frame; a pass that did not run has no counter. Rays per pixel are those that the picture took: of
-// the last frame, or of all frames of a progressive method.
+static const struct {
+    const char *name, *buffer;
+} ray_counters[] = {
+    {"vpl", "rays_vpl|-"}, {"direct", "rays_direct|-"}, {"shadow", "rays_shadow|-"}, {"path", "rays_path|-"}};
+
+// Of the last frame; a pass that did not run has no counter.
+static uint32_t rays_count(renderer *r, size_t counter)
+{
+    const gpu_buffer buffer = frame_graph_find_buffer(r->graph, ray_counters[counter].buffer);
+    uint32_t rays = 0;
+    return buffer.id && gpu_buffer_read(r->gpu, buffer, 0, &rays, sizeof(rays)) ? rays : 0;
+}
+
+double rays_per_pixel(renderer *r)
+{
+    double sum = 0;
+    for (size_t i = 0; i < countof(ray_counters); i++) {
+        sum += rays_count(r, i);
+    }
+    return sum / ((double)r->settings.width * r->settings.height);
+}
+
+// Rays per pixel are those that the picture took: of the last frame, or of all frames of a progressive method.
 static void rays_to_json(cJSON *root, renderer *r, const progressive_run *progress)
 {
-    static const struct {
-        const char *name, *buffer;
-    } counters[] = {
-        {"vpl", "rays_vpl|-"}, {"direct", "rays_direct|-"}, {"shadow", "rays_shadow|-"}, {"path", "rays_path|-"}};
     cJSON *const object = cJSON_AddObjectToObject(root, "rays");
-    double sum = 0;
-    for (size_t i = 0; i < countof(counters); i++) {
-        const gpu_buffer buffer = frame_graph_find_buffer(r->graph, counters[i].buffer);
-        uint32_t rays = 0;
-        if (buffer.id && !gpu_buffer_read(r->gpu, buffer, 0, &rays, sizeof(rays))) {
-            rays = 0;
-        }
-        cJSON_AddNumberToObject(object, counters[i].name, rays);
-        sum += rays;
+    for (size_t i = 0; i < countof(ray_counters); i++) {
+        cJSON_AddNumberToObject(object, ray_counters[i].name, rays_count(r, i));
     }
-    sum = progress ? progressive_run_rays(progress) : sum;
-    cJSON_AddNumberToObject(root, "rays_per_pixel", sum / ((double)r->settings.width * r->settings.height));
+    const double pixels = (double)r->settings.width * r->settings.height;
+    cJSON_AddNumberToObject(root, "rays_per_pixel",
+                            progress ? progressive_run_rays(progress) / pixels : rays_per_pixel(r));
 }
 
 // The first `count` items of an exported buffer; free() them. NULL when there is no such buffer.
@@ -257,15 +268,22 @@ static void lights_per_pixel_to_json(cJSON *root, renderer *r)
     }
 }
 
+void counters_export(renderer *r)
+{
+    for (size_t i = 0; i < countof(ray_counters); i++) {
+        export_add(r, ray_counters[i].buffer);
+    }
+    export_add(r, "lights_per_pixel|-");
+    export_add(r, "depth");
+}
+
 void stats_export(renderer *r)
 {
-    static const char *const names[] = {
-        "vpls|-",        "lgh_header|-", "lgh_lights|-",       "rays_vpl|-", "rays_direct|-",
-        "rays_shadow|-", "rays_path|-",  "lights_per_pixel|-", "depth",
-    };
+    static const char *const names[] = {"vpls|-", "lgh_header|-", "lgh_lights|-"};
     for (size_t i = 0; i < countof(names); i++) {
         export_add(r, names[i]);
     }
+    counters_export(r);
 }
 
 static void progress_to_json(cJSON *root, const render_settings *settings, const render_summary *summary)

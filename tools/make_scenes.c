@@ -1,4 +1,4 @@
-// make_scenes DIR: writes the scenes of our own as binary glTF: cornell.glb, two_rooms.glb and atrium.glb.
+// make_scenes DIR: writes the scenes of our own as binary glTF: cornell.glb, two_rooms.glb, door.glb and atrium.glb.
 // Metres, candela and lux; the same program gives the same bytes.
 #include "tools/make_scenes_atrium.h"
 
@@ -46,27 +46,37 @@ static void cornell_build(gltf_file *file)
     gltf_camera_add(file, "cornell", (vec3){0, height / 2, 10.6f}, (vec3){0, height / 2, 0}, 40 * pi / 180, 1);
 }
 
-// Two equal closed rooms that share a wall of 1 cm; whatever light the right one shows has leaked.
-static void two_rooms_build(gltf_file *file)
-{
-    const gltf_material white = gltf_material_add(file, &(gltf_material_desc){"white", .albedo = {0.7f, 0.7f, 0.7f}});
-    const gltf_material orange =
-        gltf_material_add(file, &(gltf_material_desc){"orange", .albedo = {0.7f, 0.35f, 0.12f}});
-    const gltf_material blue = gltf_material_add(file, &(gltf_material_desc){"blue", .albedo = {0.15f, 0.3f, 0.6f}});
+typedef struct rooms_materials {
+    gltf_material white, orange, blue;
+} rooms_materials;
 
-    // Each room is 4 x 3 x 4 m. Walls stand in floor and ceiling, and in each other, so that no faces coincide.
-    const float shared = 0.005f, outer = 4 + shared;
-    mesh shell = {0}, thin = {0};
+static rooms_materials rooms_materials_add(gltf_file *file)
+{
+    return (rooms_materials){
+        .white = gltf_material_add(file, &(gltf_material_desc){"white", .albedo = {0.7f, 0.7f, 0.7f}}),
+        .orange = gltf_material_add(file, &(gltf_material_desc){"orange", .albedo = {0.7f, 0.35f, 0.12f}}),
+        .blue = gltf_material_add(file, &(gltf_material_desc){"blue", .albedo = {0.15f, 0.3f, 0.6f}}),
+    };
+}
+
+// Two equal closed rooms of 4 x 3 x 4 m, without the wall of 2 * `shared` m between them. Walls stand in floor and
+// ceiling, and in each other, so that no faces coincide.
+static void rooms_shell_add(gltf_file *file, gltf_material white, float shared)
+{
+    const float outer = 4 + shared;
+    mesh shell = {0};
     mesh_box_add(&shell, (vec3){-outer - 0.3f, -0.2f, -2.3f}, (vec3){outer + 0.3f, 0, 2.3f});
     mesh_box_add(&shell, (vec3){-outer - 0.3f, 3, -2.3f}, (vec3){outer + 0.3f, 3.2f, 2.3f});
     mesh_box_add(&shell, (vec3){-outer - 0.25f, -0.1f, -2.2f}, (vec3){outer + 0.25f, 3.1f, -2});
     mesh_box_add(&shell, (vec3){-outer - 0.25f, -0.1f, 2}, (vec3){outer + 0.25f, 3.1f, 2.2f});
     mesh_box_add(&shell, (vec3){-outer - 0.2f, -0.05f, -2.1f}, (vec3){-outer, 3.05f, 2.1f});
     mesh_box_add(&shell, (vec3){outer, -0.05f, -2.1f}, (vec3){outer + 0.2f, 3.05f, 2.1f});
-    mesh_box_add(&thin, (vec3){-shared, -0.05f, -2.05f}, (vec3){shared, 3.05f, 2.05f});
     solid_add(file, "shell", &shell, white, (vec3){0}, 0);
-    solid_add(file, "shared wall", &thin, white, (vec3){0}, 0);
+}
 
+// The things in both rooms, the lamp in the left one, and a camera in each.
+static void rooms_furnish(gltf_file *file, const rooms_materials *materials, float shared)
+{
     mesh crate = {0}, table = {0}, post = {0};
     mesh_box_add(&crate, (vec3){-0.4f, -0.01f, -0.4f}, (vec3){0.4f, 0.8f, 0.4f});
     mesh_box_add(&table, (vec3){-0.6f, 0.7f, -0.35f}, (vec3){0.6f, 0.76f, 0.35f});
@@ -76,9 +86,9 @@ static void two_rooms_build(gltf_file *file)
     }
     mesh_box_add(&post, (vec3){-0.15f, -0.05f, -0.15f}, (vec3){0.15f, 3.05f, 0.15f});
     const gltf_mesh things[] = {
-        gltf_mesh_add(file, "crate", gltf_geometry_add(file, &crate), orange),
-        gltf_mesh_add(file, "table", gltf_geometry_add(file, &table), blue),
-        gltf_mesh_add(file, "post", gltf_geometry_add(file, &post), white),
+        gltf_mesh_add(file, "crate", gltf_geometry_add(file, &crate), materials->orange),
+        gltf_mesh_add(file, "table", gltf_geometry_add(file, &table), materials->blue),
+        gltf_mesh_add(file, "post", gltf_geometry_add(file, &post), materials->white),
     };
     mesh_fini(&crate);
     mesh_fini(&table);
@@ -93,6 +103,36 @@ static void two_rooms_build(gltf_file *file)
     const float degrees = pi / 180, aspect = 16.0f / 9.0f;
     gltf_camera_add(file, "lit", (vec3){-3.7f, 1.7f, 1.75f}, (vec3){-1.2f, 1.2f, -0.9f}, 65 * degrees, aspect);
     gltf_camera_add(file, "unlit", (vec3){0.3f, 1.7f, 1.75f}, (vec3){2.8f, 1.2f, -0.9f}, 65 * degrees, aspect);
+}
+
+// The rooms share a wall of 1 cm; whatever light the right one shows has leaked.
+static void two_rooms_build(gltf_file *file)
+{
+    const rooms_materials materials = rooms_materials_add(file);
+    const float shared = 0.005f;
+    mesh thin = {0};
+    mesh_box_add(&thin, (vec3){-shared, -0.05f, -2.05f}, (vec3){shared, 3.05f, 2.05f});
+    rooms_shell_add(file, materials.white, shared);
+    solid_add(file, "shared wall", &thin, materials.white, (vec3){0}, 0);
+    rooms_furnish(file, &materials, shared);
+}
+
+// The rooms share a wall of 10 cm with a doorway of 1 x 2.1 m. The door is closed, larger than the doorway all around,
+// and lies on the wall in the right room; turned about +Y it swings into that room.
+static void door_build(gltf_file *file)
+{
+    const rooms_materials materials = rooms_materials_add(file);
+    const float shared = 0.05f, half_width = 0.5f, height = 2.1f, overlap = 0.05f;
+    mesh wall = {0}, door = {0};
+    mesh_box_add(&wall, (vec3){-shared, -0.05f, -2.05f}, (vec3){shared, 3.05f, -half_width});
+    mesh_box_add(&wall, (vec3){-shared, -0.05f, half_width}, (vec3){shared, 3.05f, 2.05f});
+    mesh_box_add(&wall, (vec3){-shared + 0.001f, height, -half_width - 0.01f},
+                 (vec3){shared - 0.001f, 3.05f, half_width + 0.01f});
+    mesh_box_add(&door, (vec3){-0.003f, -0.01f, 0}, (vec3){0.04f, height + overlap, 2 * (half_width + overlap)});
+    rooms_shell_add(file, materials.white, shared);
+    solid_add(file, "shared wall", &wall, materials.white, (vec3){0}, 0);
+    solid_add(file, "door", &door, materials.orange, (vec3){shared, 0, -half_width - overlap}, 0);
+    rooms_furnish(file, &materials, shared);
 }
 
 static bool scene_write(const char *folder, const char *name, void (*build)(gltf_file *file))
@@ -122,6 +162,6 @@ int main(int argc, char **argv)
     }
     const bool written = scene_write(folder, "cornell.glb", cornell_build) &&
                          scene_write(folder, "two_rooms.glb", two_rooms_build) &&
-                         scene_write(folder, "atrium.glb", atrium_build);
+                         scene_write(folder, "door.glb", door_build) && scene_write(folder, "atrium.glb", atrium_build);
     return written ? 0 : 1;
 }

@@ -25,6 +25,7 @@ libcjson-dev|statistics and suites|
 libembree-dev|rays on the CPU|
 libosd-dev|subdivision surfaces|
 gnuplot-nox|charts|
+ffmpeg|movies, which lanternfield play makes|
 '
 
 missing=() backports=()
