@@ -12,7 +12,7 @@
 // white Lambertian surface would send out, in nits, so that radiance = albedo * light):
 //
 //   tlas               acceleration  the scene, for ray queries                        acceleration
-//   vpls               vpl[slots]    see renderer_vpl_slots          vpl_trace; vpl_reference where it keeps them
+//   vpls               vpl[slots]    see renderer_slots              vpl_trace; vpl_reference where it keeps them
 //   lgh_header         lgh_header                                                      lgh_build
 //   lgh_lights         grid_light[]  merged, top level first                           lgh_build
 //   lgh_sums           lgh_sums[]    the same order; with lgh_masks, lgh_ranks, lgh_vertices: see shaders/lgh.glsl.h
@@ -53,7 +53,9 @@
 //   probes             probe[]       see modules/probe.h                               probe
 //   vpl_flux           vec3[paths]   of the traced light paths at their last hit                      vpl_trace
 //   vpl_changed        uint[]        a bit a slot, where not all VPLs are traced anew; see vpl_trace.h  vpl_trace
-//   vpl_mask, vpl_list bits and numbers of the paths that are; vpl_shares, vpl_sources, vpl_elements: see shaders/shared.h
+//   vpl_slot_lights    uint[]        light of each light slot, or LIGHT_SLOT_EMPTY                     vpl_trace
+//   vpl_mask, vpl_list bits and numbers of the paths that are; vpl_shares, vpl_sources, vpl_elements: see
+//   shaders/shared.h
 #pragma once
 
 #include "engine/ecs.h"
@@ -121,6 +123,11 @@ entity renderer_pass_find(const renderer *r, const char *name); // {0} when ther
 bool renderer_has_vpls(const renderer *r); // settings ask for indirect light by VPLs, and there are VPLs and lights
 bool renderer_has_indirect(const renderer *r); // and the lighting grid hierarchy gathers them
 uint32_t renderer_vpl_slots(const renderer *r); // settings' vpls, or ir_vpls
+// Behind them, where more than settings' many_lights point lights are in the scene: slots for these. They have the
+// normal 0 and radiate evenly, and their light, direct though it is, is in `indirect` and what is made of it. Only
+// where the whole light is rendered: --only, `vpl` and `path` know direct light as such.
+uint32_t renderer_light_slots(const renderer *r);
+uint32_t renderer_slots(const renderer *r); // both
 bool renderer_has_shadows(const renderer *r); // indirect light with shadow samples
 // b in metres: no light's singularity is closer than this.
 float renderer_singularity(const renderer *r);
