@@ -1,6 +1,8 @@
-// make_scenes DIR: writes the scenes of our own as binary glTF: cornell.glb, two_rooms.glb and atrium.glb.
+// make_scenes DIR: writes the scenes of our own as binary glTF: cornell.glb, two_rooms.glb, atrium.glb,
+// lanterns.glb and lanterns_500.glb.
 // Metres, candela and lux; the same program gives the same bytes.
 #include "tools/make_scenes_atrium.h"
+#include "tools/make_scenes_lanterns.h"
 
 #include <errno.h>
 #include <math.h>
@@ -120,8 +122,9 @@ int main(int argc, char **argv)
         log_error("%s: cannot make the folder: %s", folder, strerror(errno));
         return 1;
     }
-    const bool written = scene_write(folder, "cornell.glb", cornell_build) &&
-                         scene_write(folder, "two_rooms.glb", two_rooms_build) &&
-                         scene_write(folder, "atrium.glb", atrium_build);
+    const bool written =
+        scene_write(folder, "cornell.glb", cornell_build) && scene_write(folder, "two_rooms.glb", two_rooms_build) &&
+        scene_write(folder, "atrium.glb", atrium_build) && scene_write(folder, "lanterns.glb", lanterns_build) &&
+        scene_write(folder, "lanterns_500.glb", lanterns_500_build);
     return written ? 0 : 1;
 }

@@ -262,6 +262,12 @@ static void node_mesh_set(gltf_file *file, cJSON *node, gltf_mesh mesh)
     file->triangle_count += (size_t)cJSON_GetObjectItem(accessor, "count")->valueint / 3;
 }
 
+static void node_light_set(cJSON *node, gltf_light light)
+{
+    cJSON *extension = cJSON_AddObjectToObject(cJSON_AddObjectToObject(node, "extensions"), "KHR_lights_punctual");
+    cJSON_AddNumberToObject(extension, "light", light.id - 1);
+}
+
 void gltf_node_add(gltf_file *file, gltf_mesh mesh, vec3 position, float yaw)
 {
     cJSON *node = node_append(file, position);
@@ -300,6 +306,8 @@ gltf_node gltf_node_create(gltf_file *file, const gltf_node_desc *desc)
         node_mesh_set(file, node, desc->mesh);
     if (desc->skin.id)
         cJSON_AddNumberToObject(node, "skin", desc->skin.id - 1);
+    if (desc->light.id)
+        node_light_set(node, desc->light);
     return last_node(file);
 }
 
@@ -396,17 +404,25 @@ void gltf_camera_add(gltf_file *file, const char *name, vec3 eye, vec3 target, f
     cJSON_AddItemToObject(node, "rotation", quat_json(gltf_look(vec3_sub(target, eye))));
 }
 
-static void light_add(gltf_file *file, cJSON *node, const char *name, const char *type, vec3 color, float intensity)
+static gltf_light light_append(gltf_file *file, const char *name, const char *type, vec3 color, float intensity)
 {
     cJSON *light = object_append(file->lights);
     cJSON_AddStringToObject(light, "name", name);
     cJSON_AddStringToObject(light, "type", type);
     cJSON_AddItemToObject(light, "color", vec3_json(color));
     cJSON_AddNumberToObject(light, "intensity", intensity);
+    return (gltf_light){(uint32_t)cJSON_GetArraySize(file->lights)};
+}
 
+static void light_add(gltf_file *file, cJSON *node, const char *name, const char *type, vec3 color, float intensity)
+{
     cJSON_AddStringToObject(node, "name", name);
-    cJSON *extension = cJSON_AddObjectToObject(cJSON_AddObjectToObject(node, "extensions"), "KHR_lights_punctual");
-    cJSON_AddNumberToObject(extension, "light", cJSON_GetArraySize(file->lights) - 1);
+    node_light_set(node, light_append(file, name, type, color, intensity));
+}
+
+gltf_light gltf_light_add(gltf_file *file, const char *name, vec3 color, float candela)
+{
+    return light_append(file, name, "point", color, candela);
 }
 
 void gltf_point_light_add(gltf_file *file, const char *name, vec3 position, vec3 color, float candela)

@@ -26,6 +26,9 @@ typedef struct gltf_mesh {
 typedef struct gltf_node {
     uint32_t id;
 } gltf_node;
+typedef struct gltf_light {
+    uint32_t id;
+} gltf_light;
 typedef struct gltf_skin {
     uint32_t id;
 } gltf_skin;
@@ -82,7 +85,10 @@ typedef struct gltf_node_desc {
     float scale; // 0 means 1
     gltf_mesh mesh; // {0}: none
     gltf_skin skin; // {0}: none
+    gltf_light light; // {0}: none
 } gltf_node_desc;
+// A point light that any number of nodes may carry.
+gltf_light gltf_light_add(gltf_file *file, const char *name, vec3 color, float candela);
 gltf_node gltf_node_create(gltf_file *file, const gltf_node_desc *desc);
 
 // `inverse_bind`, column-major, brings a point from mesh space to the joint's.
