@@ -1,4 +1,5 @@
 // Direct light: few punctual lights exactly, with a shadow ray each; many of them, and emissive triangles, by samples.
+// Point lights that join the lighting grid hierarchy (renderer_light_slots) are left out: they are many more.
 #include "direct_light.h"
 #include "light_rays.h"
 #include "modules.h"

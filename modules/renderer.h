@@ -26,7 +26,8 @@
 //   direct             RGBA32F       light of the punctual lights that are shadowed one by one   direct_light
 //   direct_u, direct_s RGBA32F       unshadowed and shadowed estimate of sampled direct light, where there is any
 //   direct_analytic    RGBA32F       its unshadowed light without noise, where that is known
-//   indirect           RGBA32F       unshadowed; a: sum of the weights f; tiled when interleaved
+//   indirect           RGBA32F       unshadowed, of VPLs and the point lights among them (renderer_light_slots); a: sum
+//                                    of the weights f; tiled when interleaved
 //                                    (by light_gather or light_volume, like the next two)
 //   lights_per_pixel   R32F          lights with a non-zero blending function; tiled like `indirect`
 //   reservoirs         buffer        shadow samples a pixel: uint[k + 1], a sum's bits and k lights; light_volume's
