@@ -224,6 +224,16 @@ bool renderer_has_indirect(const renderer *r)
     return r->settings.method == METHOD_LGH && renderer_has_vpls(r);
 }
 
+uint32_t renderer_light_slots(const renderer *r)
+{
+    return renderer_has_indirect(r) ? r->gpu_world->light_slots.count : 0;
+}
+
+uint32_t renderer_slots(const renderer *r)
+{
+    return renderer_vpl_slots(r) + renderer_light_slots(r);
+}
+
 bool renderer_has_shadows(const renderer *r)
 {
     return renderer_has_indirect(r) && r->settings.shadow_samples > 0 && r->settings.only != ONLY_INDIRECT_UNSHADOWED;

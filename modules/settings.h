@@ -24,6 +24,7 @@ typedef struct render_settings {
     float ray_budget; // indirect shadow rays per pixel on average, at most shadow_samples; 0: shadow_samples everywhere
     uint32_t vpls; // slots, 0 to 2,500,000
     uint32_t bounces; // indirect bounces, 1 to 8
+    uint32_t many_lights; // more point lights than this join the hierarchy, see renderer_light_slots
     float alpha; // r_l = alpha * h_l; > 0
     uint32_t levels; // 0: automatic
     uint32_t grid; // where the hierarchy's grid lies

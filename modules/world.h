@@ -2,6 +2,7 @@
 // geometry, materials and textures once, and extracts instances, lights and frame constants every frame.
 #pragma once
 
+#include "light_slots.h"
 #include "renderer.h"
 
 // Components. An engine adds, changes and removes them while running; the next frame follows.
@@ -93,6 +94,10 @@ typedef struct world_gpu {
     const world_source *sources; // this frame's, by kind and entity
     uint32_t source_count;
     world_changes changes; // of this frame
+    // Lights from this one on, all of them point lights, join the lighting grid hierarchy, and direct_light leaves them
+    // out; the number of punctual lights where none does. Their slots hold their indices.
+    uint32_t first_joined;
+    light_slots light_slots;
     float light_power; // of all sources: luminous flux in lumen-like units (watts of luminance); 0: no light at all
 
     // What the CPU knows of the scene. Instances are ordered by recursive median split over their centres, for drivers

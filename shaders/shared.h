@@ -276,7 +276,7 @@ SHARED_STRUCT(vpl) {
     float intensity;       // luminance of `color`; 0: an empty slot
     SHARED_VEC3(color);    // cd per channel: flux * albedo / pi
     uint path;
-    SHARED_VEC3(normal);   // unit geometric normal on the lit side
+    SHARED_VEC3(normal);   // unit geometric normal on the lit side; 0: a point light of color / 4 cd, see lgh_shade.glsl.h
     uint bounce;           // 0 is the first hit
 } SHARED_END(vpl, 48)
 
@@ -326,7 +326,7 @@ SHARED_STRUCT(grid_light) {
     uint vertex;            // x | y << 10 | z << 20, on the grid of its level
     SHARED_VEC3(deviation); // standard deviation of the lights' positions, per axis, metres
     SHARED_VEC3(normal);    // mean normal m, not unit
-    SHARED_VEC3(moment_diagonal); // second moment M of the normals
+    SHARED_VEC3(moment_diagonal); // second moment M of the normals; its trace is the share of VPLs of surfaces
     SHARED_VEC3(moment_mixed);
 } SHARED_END(grid_light, 80)
 

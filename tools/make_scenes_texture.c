@@ -146,6 +146,20 @@ texel texture_paving(float u, float v)
     };
 }
 
+texel texture_cobbles(float u, float v)
+{
+    const float bend = 0.012f * fractal_noise(u, v, 6, 3, 55);
+    const masonry_place place = masonry(u + bend, v - bend, 8, 8, 0.5f, 1.2f, 56);
+    const float clouds = fractal_noise(u, v, 8, 5, 57), grain = fractal_noise(u, v, 64, 3, 58);
+    const float sett = smooth(0.006f, 0.016f, place.edge + 0.003f * grain);
+    const vec3 warm = {0.30f, 0.26f, 0.21f}, grey = {0.21f, 0.21f, 0.22f}, joint = {0.08f, 0.07f, 0.06f};
+    const vec3 stone = vec3_scale(mix3(grey, warm, place.tone), 1 + 0.2f * clouds + 0.15f * grain);
+    return (texel){
+        .albedo = mix3(joint, stone, sett),
+        .height = 0.02f * smooth(0, 0.06f, place.edge) + 0.002f * grain + 0.004f * place.tone,
+    };
+}
+
 texel texture_marble(float u, float v)
 {
     const masonry_place place = masonry(u, v, 2, 2, 0, 1.2f, 61);
@@ -203,6 +217,31 @@ texel texture_cloth_ochre(float u, float v)
 texel texture_cloth_blue(float u, float v)
 {
     return cloth(u, v, (vec3){0.06f, 0.13f, 0.40f}, (vec3){0.55f, 0.50f, 0.38f}, 85);
+}
+
+// Broad stripes along v of a coarse weave.
+static texel awning(float u, float v, vec3 dye, uint32_t seed)
+{
+    const vec3 linen = {0.70f, 0.63f, 0.50f};
+    const float weave = noise(u, v, 128, 16, seed) + noise(u, v, 16, 128, seed + 1) - 1;
+    const float faded = fractal_noise(u, v, 3, 4, seed + 2), stripe = fract(4 * u);
+    const vec3 color = stripe < 0.5f ? dye : linen;
+    return (texel){.albedo = vec3_scale(color, 0.95f + 0.12f * weave + 0.12f * faded)};
+}
+
+texel texture_awning_red(float u, float v)
+{
+    return awning(u, v, (vec3){0.52f, 0.07f, 0.05f}, 101);
+}
+
+texel texture_awning_blue(float u, float v)
+{
+    return awning(u, v, (vec3){0.07f, 0.15f, 0.36f}, 104);
+}
+
+texel texture_awning_ochre(float u, float v)
+{
+    return awning(u, v, (vec3){0.60f, 0.36f, 0.08f}, 107);
 }
 
 // Leaflets on both sides of a rib, longest at a third of the way; x in [-1, 1] across, y in [0, 1] from stalk to tip.
