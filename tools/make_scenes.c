@@ -1,4 +1,4 @@
-// make_scenes DIR: writes the scenes of our own as binary glTF: cornell.glb, two_rooms.glb and atrium.glb.
+// make_scenes DIR: writes the scenes of our own as binary glTF: cornell.glb, two_rooms.glb, atrium.glb and dancers.glb.
 // Metres, candela and lux; the same program gives the same bytes.
 #include "tools/make_scenes_atrium.h"
 
@@ -120,8 +120,8 @@ int main(int argc, char **argv)
         log_error("%s: cannot make the folder: %s", folder, strerror(errno));
         return 1;
     }
-    const bool written = scene_write(folder, "cornell.glb", cornell_build) &&
-                         scene_write(folder, "two_rooms.glb", two_rooms_build) &&
-                         scene_write(folder, "atrium.glb", atrium_build);
+    const bool written =
+        scene_write(folder, "cornell.glb", cornell_build) && scene_write(folder, "two_rooms.glb", two_rooms_build) &&
+        scene_write(folder, "atrium.glb", atrium_build) && scene_write(folder, "dancers.glb", dancers_build);
     return written ? 0 : 1;
 }
