@@ -171,7 +171,8 @@ static figure_pose stand_at(uint32_t dancer, float t)
         .neck = turned(0.1f * wave(t, 3, phase), 0.04f - 0.5f * lean, -0.04f * wave(t, 2, phase)),
         .head = turned(0.15f * wave(t, 3, phase), 0.05f * wave(t, 5, phase), 0.05f * wave(t, 4, phase + 1)),
     };
-    stance.hips.y = -0.032f - 0.014f * bounce;
+    const float crouch = couple->dance == DANCE_BALL ? 0.02f : 0.03f; // long steps need bent knees
+    stance.hips.y = -crouch - 0.014f * bounce;
     for (figure_side side = 0; side < FIGURE_SIDES; side++) {
         stance.feet[side] = foot_at(dancer, side, t);
         stance.feet[side].ball = vec3_scale(stance.feet[side].ball, to_own);

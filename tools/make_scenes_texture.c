@@ -287,14 +287,15 @@ static vec3 shirt_paint(const costume *costume, float x, float y)
     vec3 paint = mix3(costume->shirt, vec3_scale(costume->shirt, 0.8f), placket);
     paint = mix3(paint, costume->trim, cuff);
     if (costume->waistcoat) {
-        const float cloth = (1 - smooth(0.135f, 0.14f, side)) * (1 - smooth(1.4f, 1.405f, y));
+        const float half = mix(0.185f, 0.125f, smooth(1.26f, 1.32f, y));
+        const float cloth = (1 - smooth(half, half + 0.005f, side)) * (1 - smooth(1.4f, 1.405f, y));
         const float button = band(x, 0.007f, 0.003f) * band(fract(y / 0.06f) * 0.06f - 0.03f, 0.007f, 0.003f);
         paint = mix3(paint, mix3(costume->over_shirt, costume->trim, button), cloth);
     }
     if (costume->braces)
         paint = mix3(paint, costume->over_shirt, band(side - 0.085f, 0.018f, 0.004f));
     if (costume->skirt) // a bodice
-        paint = mix3(paint, costume->over_shirt, (1 - smooth(0.15f, 0.155f, side)) * (1 - smooth(1.3f, 1.305f, y)));
+        paint = mix3(paint, costume->over_shirt, (1 - smooth(0.185f, 0.19f, side)) * (1 - smooth(1.3f, 1.305f, y)));
     return paint;
 }
 
