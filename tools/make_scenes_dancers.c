@@ -385,10 +385,12 @@ static void dancers_add(gltf_file *file, gltf_clip clip, gltf_times times)
     costumes_add(file, meshes);
     for (uint32_t i = 0; i < DANCERS; i++) {
         gltf_node joints[JOINT_COUNT];
-        const gltf_node root = gltf_node_create(file, &(gltf_node_desc){dancers[i].name, .scale = dancers[i].size});
-        figure_skeleton_add(file, root, joints);
+        const gltf_node root = gltf_node_create(file, &(gltf_node_desc){"skeleton", .scale = dancers[i].size});
+        const figure_pose first = pose_at(i, 0);
+        figure_skeleton_add(file, root, &first, joints);
         // A root: its own transform would not move the mesh.
         gltf_node_create(file, &(gltf_node_desc){
+                                   .name = dancers[i].name,
                                    .mesh = meshes[dancers[i].costume],
                                    .skin = figure_skin_add(file, dancers[i].name, joints),
                                });

@@ -505,16 +505,17 @@ gltf_geometry figure_geometry_add(gltf_file *file, const figure_build *build)
 
 // ---- Skeleton
 
-void figure_skeleton_add(gltf_file *file, gltf_node root, gltf_node joints[JOINT_COUNT])
+void figure_skeleton_add(gltf_file *file, gltf_node root, const figure_pose *pose, gltf_node joints[JOINT_COUNT])
 {
     for (figure_joint joint = 0; joint < JOINT_COUNT; joint++) {
         const figure_joint parent = figure_parent(joint);
         const bool is_root = joint == JOINT_HIPS;
-        const vec3 from = is_root ? (vec3){0} : figure_rest_position(parent);
+        const vec3 bone = vec3_sub(figure_rest_position(joint), figure_rest_position(parent));
         joints[joint] = gltf_node_create(file, &(gltf_node_desc){
                                                    .name = figure_joint_name(joint),
                                                    .parent = is_root ? root : joints[parent],
-                                                   .translation = vec3_sub(figure_rest_position(joint), from),
+                                                   .translation = is_root ? pose->positions[JOINT_HIPS] : bone,
+                                                   .rotation = figure_local_rotation(pose, joint),
                                                });
     }
 }

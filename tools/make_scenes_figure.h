@@ -58,8 +58,6 @@ gltf_geometry figure_geometry_add(gltf_file *file, const figure_build *build);
 const char *figure_joint_name(figure_joint joint);
 figure_joint figure_parent(figure_joint joint); // of JOINT_HIPS: itself
 vec3 figure_rest_position(figure_joint joint); // in the figure's space; no joint is turned at rest
-// The joints' nodes, at rest, under `root`.
-void figure_skeleton_add(gltf_file *file, gltf_node root, gltf_node joints[JOINT_COUNT]);
 gltf_skin figure_skin_add(gltf_file *file, const char *name, const gltf_node joints[JOINT_COUNT]);
 
 // ---- Rotations
@@ -88,6 +86,8 @@ typedef struct figure_stance {
     figure_foot feet[FIGURE_SIDES];
 } figure_stance;
 
+// The joints' nodes in a pose, under `root`, whose space is the figure's.
+void figure_skeleton_add(gltf_file *file, gltf_node root, const figure_pose *pose, gltf_node joints[JOINT_COUNT]);
 // Hips, spine, head and legs; the arms hang as they do at rest. A foot out of reach floats on the leg's straight line.
 figure_pose figure_stand(const figure_stance *stance);
 // Bends an arm so that its wrist is at `wrist`, or as near as it gets, the elbow towards the direction `elbow`. Raises
