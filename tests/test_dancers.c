@@ -108,6 +108,35 @@ static bool is_closed_manifold(const uint32_t (*quads)[4], int quad_count, int v
     return closed;
 }
 
+static void triangle_normal(const float *a, const float *b, const float *c, double out[3])
+{
+    double e[3], f[3];
+    for (int k = 0; k < 3; k++) {
+        e[k] = (double)b[k] - (double)a[k];
+        f[k] = (double)c[k] - (double)a[k];
+    }
+    for (int k = 0; k < 3; k++)
+        out[k] = e[(k + 1) % 3] * f[(k + 2) % 3] - e[(k + 2) % 3] * f[(k + 1) % 3];
+}
+
+static double dot(const double a[3], const double b[3])
+{
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
+
+// Folded by at most 30 degrees and convex: what makes a pair of triangles one quad of a cage.
+static bool is_quad(const float (*positions)[3], const uint32_t quad[4])
+{
+    double normals[4][3], mean[3];
+    for (int k = 0; k < 4; k++)
+        triangle_normal(positions[quad[k]], positions[quad[(k + 1) % 4]], positions[quad[(k + 2) % 4]], normals[k]);
+    // Those at corners 0 and 2 are the two triangles.
+    const double cosine = dot(normals[0], normals[2]) / sqrt(dot(normals[0], normals[0]) * dot(normals[2], normals[2]));
+    for (int k = 0; k < 3; k++)
+        mean[k] = normals[0][k] + normals[2][k];
+    return cosine >= cos(M_PI / 6) && dot(normals[1], mean) > 0 && dot(normals[3], mean) > 0;
+}
+
 TEST(costumes_are_closed_cages_of_quads_marked_for_subdivision)
 {
     int cages = 0;
@@ -126,6 +155,7 @@ TEST(costumes_are_closed_cages_of_quads_marked_for_subdivision)
             const uint32_t *pair = triangles + 6 * i;
             paired = paired && pair[0] == pair[3] && pair[2] == pair[4];
             const uint32_t corners[4] = {pair[0], pair[1], pair[2], pair[5]};
+            paired = paired && is_quad(positions, corners);
             for (int k = 0; k < 4; k++)
                 quads[i][k] = welded(positions, corners[k]);
         }

@@ -106,17 +106,17 @@ static const figure_joint left_hip = JOINT_HIP + FIGURE_LEFT, right_hip = JOINT_
 static void crotch_shape(cage *cage, trunk *trunk)
 {
     const uint32_t *ring = trunk->rings[RING_CROTCH];
-    static const float lift[TRUNK] = {0.05f, 0.035f, -0.01f, 0.035f, 0.05f, 0, -0.03f, 0};
+    static const float lift[TRUNK] = {0.05f, 0.03f, 0.01f, 0.03f, 0.05f, 0.005f, -0.008f, 0.005f};
     for (int i = 0; i < TRUNK; i++) {
         const bool in_middle = i % 4 == 2;
         cage->positions[ring[i]].y += lift[i];
         if (!in_middle)
             cage->weights[ring[i]] = weights_of(JOINT_HIPS, 0.6f, i < 2 || i == 7 ? left_hip : right_hip);
     }
-    trunk->crotch = vertex_add(cage, (vec3){0, 0.79f, -0.01f}, weights_of(JOINT_HIPS, 1, JOINT_HIPS));
+    trunk->crotch = vertex_add(cage, (vec3){0, 0.802f, -0.01f}, weights_of(JOINT_HIPS, 1, JOINT_HIPS));
 }
 
-// The shoulders are highest at their sides and move with the collar bones.
+// The shoulders are highest at their sides and move with the collar bones; the armpits are hollow.
 static void shoulders_shape(cage *cage, trunk *trunk)
 {
     const uint32_t *top = trunk->rings[RING_SHOULDERS], *armpits = trunk->rings[RING_ARMPITS];
@@ -126,6 +126,12 @@ static void shoulders_shape(cage *cage, trunk *trunk)
             continue;
         const figure_side side = i < 2 || i == 7 ? FIGURE_LEFT : FIGURE_RIGHT;
         cage->positions[top[i]].y += i % 4 == 0 ? 0.015f : -0.01f;
+        if (i % 4 == 0) {
+            cage->positions[armpits[i]].x *= 0.82f;
+            cage->positions[armpits[i]].y -= 0.02f;
+        } else {
+            cage->positions[armpits[i]].z -= cage->positions[armpits[i]].z > 0 ? 0.012f : 0;
+        }
         cage->weights[top[i]] = weights_of(JOINT_CHEST, i % 4 == 0 ? 0.3f : 0.6f, JOINT_CLAVICLE + side);
         cage->weights[armpits[i]] = weights_of(JOINT_CHEST, i % 4 == 0 ? 0.65f : 0.8f, JOINT_SHOULDER + side);
     }
@@ -199,8 +205,7 @@ static void head_add(cage *cage, const figure_build *build, const uint32_t neck_
     uint32_t loops[COUNT][TRUNK];
     for (int i = 0; i < COUNT; i++)
         trunk_ring_add(cage, &rings[i], loops[i]);
-    cage->positions[loops[NOSE][2]].z += 0.034f;
-    cage->positions[loops[EYES][2]].z -= 0.006f;
+    cage->positions[loops[NOSE][2]].z += 0.018f;
     cage->positions[loops[JAW][2]].z += 0.012f;
 
     bridge(cage, loops[NECK], neck_base, TRUNK, REGION_SKIN);
@@ -228,7 +233,7 @@ static float side_sign(figure_side side)
 typedef struct limb_ring {
     float at; // metres along the limb: from the shoulder's joint, or the height
     float radius_up, radius_front, radius_back; // `up`: of an arm, away from its underside; of a leg, sideways
-    float x, z; // of the middle, of a leg
+    float x, z; // of a leg's middle; x, of an arm: how much further along its underside is than its middle
     figure_joint a, b; // of the left side
     float weight_a;
 } limb_ring;
@@ -254,7 +259,8 @@ static void arm_ring_add(cage *cage, const limb_ring *ring, float thickness, uin
     for (int i = 0; i < LIMB; i++) {
         const float angle = (float)i * pi / 3;
         loop[i] = vertex_add(cage,
-                             arm_place(cage->side, ring->at, cosf(angle) * ring->radius_up * limb_swell * thickness,
+                             arm_place(cage->side, ring->at - ring->x * cosf(angle),
+                                       cosf(angle) * ring->radius_up * limb_swell * thickness,
                                        ring->z + sinf(angle) * ring->radius_front * limb_swell * thickness),
                              limb_weights(cage, ring));
     }
@@ -266,8 +272,8 @@ static void thumb_add(cage *cage, const uint32_t wrist[LIMB], const uint32_t knu
     const uint32_t root[4] = {wrist[1], wrist[2], knuckles[2], knuckles[1]};
     uint32_t tip[4];
     for (int i = 0; i < 4; i++) {
-        const float up = i == 0 || i == 3 ? 0.004f : -0.02f, forward = i < 2 ? 0 : 0.032f;
-        tip[i] = vertex_add(cage, arm_place(cage->side, along + forward, up, 0.075f - 0.6f * forward),
+        const float up = i == 0 || i == 3 ? 0.01f : -0.016f, forward = i < 2 ? 0 : 0.036f;
+        tip[i] = vertex_add(cage, arm_place(cage->side, along + forward, up, 0.092f - 0.4f * forward),
                             weights_of(JOINT_WRIST + cage->side, 1, JOINT_WRIST));
     }
     bridge(cage, root, tip, 4, REGION_SKIN);
@@ -278,8 +284,8 @@ static void arm_add(cage *cage, const figure_build *build, const trunk *trunk)
 {
     enum { DELTOID, UPPER, OVER_ELBOW, ELBOW, UNDER_ELBOW, FOREARM, WRIST, KNUCKLES, TIPS, COUNT };
     static const limb_ring rings[COUNT] = {
-        [DELTOID] = {0.055f, 0.058f, 0.058f, 0, 0, 0, JOINT_SHOULDER, JOINT_CLAVICLE, 0.75f},
-        [UPPER] = {0.15f, 0.047f, 0.05f, 0, 0, -0.002f, JOINT_SHOULDER, JOINT_SHOULDER, 1},
+        [DELTOID] = {0.11f, 0.052f, 0.061f, 0, 0.035f, 0.004f, JOINT_SHOULDER, JOINT_CLAVICLE, 0.75f},
+        [UPPER] = {0.175f, 0.046f, 0.048f, 0, 0.01f, -0.002f, JOINT_SHOULDER, JOINT_SHOULDER, 1},
         [OVER_ELBOW] = {0.235f, 0.041f, 0.043f, 0, 0, -0.004f, JOINT_SHOULDER, JOINT_ELBOW, 0.87f},
         [ELBOW] = {0.28f, 0.04f, 0.041f, 0, 0, -0.005f, JOINT_SHOULDER, JOINT_ELBOW, 0.5f},
         [UNDER_ELBOW] = {0.33f, 0.039f, 0.042f, 0, 0, -0.002f, JOINT_SHOULDER, JOINT_ELBOW, 0.1f},
@@ -348,7 +354,7 @@ static void leg_add(cage *cage, const figure_build *build, const trunk *trunk)
 {
     enum { THIGH, MIDDLE, OVER_KNEE, KNEE, UNDER_KNEE, CALF, SHIN, ANKLE, SOLE, COUNT };
     static const limb_ring trousers[COUNT] = {
-        [THIGH] = {0.755f, 0.083f, 0.085f, 0.092f, 0.094f, -0.005f, JOINT_HIP, JOINT_HIPS, 0.85f},
+        [THIGH] = {0.745f, 0.073f, 0.085f, 0.092f, 0.1f, -0.005f, JOINT_HIP, JOINT_HIPS, 0.85f},
         [MIDDLE] = {0.64f, 0.072f, 0.077f, 0.076f, 0.096f, 0, JOINT_HIP, JOINT_HIP, 1},
         [OVER_KNEE] = {0.555f, 0.06f, 0.064f, 0.06f, 0.098f, 0.004f, JOINT_HIP, JOINT_KNEE, 0.87f},
         [KNEE] = {0.5f, 0.055f, 0.06f, 0.052f, 0.098f, 0.006f, JOINT_HIP, JOINT_KNEE, 0.5f},
@@ -453,7 +459,20 @@ static gltf_influences influences_of(const joint_weights *weights)
     return influences;
 }
 
-// A vertex of the cage becomes one of the mesh for each region around it.
+static vec3 corner_normal(const cage *cage, uint32_t a, uint32_t b, uint32_t c)
+{
+    const vec3 *p = cage->positions;
+    return vec3_normalize(vec3_cross(vec3_sub(p[b], p[a]), vec3_sub(p[c], p[a])));
+}
+
+// Cosine of the fold along the diagonal from corner `first`.
+static float fold_cosine(const cage *cage, const uint32_t quad[4], int first)
+{
+    const uint32_t a = quad[first], b = quad[first + 1], c = quad[(first + 2) % 4], d = quad[(first + 3) % 4];
+    return vec3_dot(corner_normal(cage, a, b, c), corner_normal(cage, a, c, d));
+}
+
+// A vertex of the cage becomes one of the mesh for each region around it. Quads are cut where they fold less.
 static gltf_geometry cage_write(gltf_file *file, const cage *cage)
 {
     static uint32_t written[CAGE_VERTICES][REGION_COUNT]; // 1 + vertex of the mesh
@@ -475,8 +494,10 @@ static gltf_geometry cage_write(gltf_file *file, const cage *cage)
             }
             corners[k] = *known - 1;
         }
-        mesh_triangle_add(&mesh, corners[0], corners[1], corners[2]);
-        mesh_triangle_add(&mesh, corners[0], corners[2], corners[3]);
+        const int first = fold_cosine(cage, cage->quads[i], 1) > fold_cosine(cage, cage->quads[i], 0);
+        const uint32_t from = corners[first], opposite = corners[first + 2];
+        mesh_triangle_add(&mesh, from, corners[first + 1], opposite);
+        mesh_triangle_add(&mesh, from, opposite, corners[(first + 3) % 4]);
     }
     assert(mesh.index_count == 6 * cage->quad_count);
     const gltf_geometry geometry = gltf_geometry_add(file, &mesh);
