@@ -45,8 +45,8 @@ static const struct couple {
     float angle; // at the start
     float distance; // of each from the middle
 } couples[COUPLES] = {
-    {DANCE_HAND_IN_HAND, -2.7f, -1.1f, 2, 0.4f, 0.42f},
-    {DANCE_HAND_IN_HAND, 2.3f, -1.9f, -2, 1.9f, 0.43f},
+    {DANCE_HAND_IN_HAND, -2.7f, -1.1f, 2, 0.4f, 0.41f},
+    {DANCE_HAND_IN_HAND, 2.3f, -1.9f, -2, 1.9f, 0.41f},
     {DANCE_AROUND, -0.2f, -2.6f, 1, 2.7f, 0.75f},
     {DANCE_BALL, 1.1f, 0.9f, 0, 1.25f, 1.3f},
 };
@@ -95,7 +95,7 @@ static place path_at(uint32_t dancer, float t)
     place place = {couple_middle(couple, t), angle + pi};
     switch (couple->dance) {
     case DANCE_HAND_IN_HAND:
-        place.position = vec3_add(place.position, vec3_scale(outward, couple->distance + 0.05f * wave(t, 5, 0)));
+        place.position = vec3_add(place.position, vec3_scale(outward, couple->distance + 0.03f * wave(t, 5, 0)));
         break;
     case DANCE_AROUND:
         place.position = vec3_add(place.position, vec3_scale(outward, couple->distance + 0.06f * wave(t, 4, 0)));
@@ -212,7 +212,7 @@ static void hands_join(uint32_t dancer, float t, figure_pose *pose)
         // The first dancer's left hand holds the second one's right.
         const float hands = outward * partner_sign(dancer);
         const float height = 1.18f + 0.17f * wave(t, 5, couple->angle + (hands > 0 ? 0 : pi));
-        const float apart = 0.3f + 0.06f * wave(t, 10, couple->angle);
+        const float apart = 0.27f + 0.05f * wave(t, 10, couple->angle);
         const vec3 from_middle = vec3_yaw((vec3){outward * apart, height, -0.085f}, place.yaw);
         reach(pose, side, vec3_scale(vec3_add(couple_middle(couple, t), from_middle), to_own));
     }

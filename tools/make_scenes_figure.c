@@ -353,7 +353,7 @@ static void foot_add(cage *cage, const uint32_t ankle[LIMB], const uint32_t sole
 static void leg_add(cage *cage, const figure_build *build, const trunk *trunk)
 {
     enum { THIGH, MIDDLE, OVER_KNEE, KNEE, UNDER_KNEE, CALF, SHIN, ANKLE, SOLE, COUNT };
-    static const limb_ring trousers[COUNT] = {
+    static const limb_ring rings[COUNT] = {
         [THIGH] = {0.745f, 0.073f, 0.085f, 0.092f, 0.1f, -0.005f, JOINT_HIP, JOINT_HIPS, 0.85f},
         [MIDDLE] = {0.64f, 0.072f, 0.077f, 0.076f, 0.096f, 0, JOINT_HIP, JOINT_HIP, 1},
         [OVER_KNEE] = {0.555f, 0.06f, 0.064f, 0.06f, 0.098f, 0.004f, JOINT_HIP, JOINT_KNEE, 0.87f},
@@ -371,11 +371,10 @@ static void leg_add(cage *cage, const figure_build *build, const trunk *trunk)
     const uint32_t *from = hole;
     uint32_t loops[COUNT][LIMB];
     for (int i = 0; i < COUNT; i++) {
-        limb_ring shape = trousers[i];
         // Bare shins are slimmer than trousers.
         const float slim = build->skirt && i > UNDER_KNEE && i < SOLE ? 0.8f : 1;
         const figure_region leg = build->skirt ? REGION_SKIN : REGION_LOWER;
-        leg_ring_add(cage, &shape, i < SOLE ? build->limbs * slim : 1, loops[i]);
+        leg_ring_add(cage, &rings[i], i < SOLE ? build->limbs * slim : 1, loops[i]);
         for (uint32_t column = 0; column < LIMB; column++)
             if (i != SOLE || column != 1)
                 column_add(cage, from, loops[i], LIMB, column, i == SOLE ? REGION_SHOES : leg);

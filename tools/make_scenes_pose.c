@@ -202,6 +202,14 @@ vec3 figure_chest_place(const figure_pose *pose, vec3 offset)
     return vec3_add(pose->positions[JOINT_CHEST], quat_rotate(pose->rotations[JOINT_CHEST], offset));
 }
 
+// A limb of that length follows exactly up to nine tenths of it, then less and less: its joint would jerk otherwise as
+// it straightens.
+static float eased_reach(float distance, float length)
+{
+    const float easy = 0.9f * length, rest = length - easy;
+    return distance < easy ? distance : easy + rest * (1 - expf(-(distance - easy) / rest));
+}
+
 void figure_reach(figure_pose *pose, figure_side side, vec3 wrist, vec3 elbow_towards)
 {
     const figure_joint clavicle = JOINT_CLAVICLE + side, shoulder = JOINT_SHOULDER + side, elbow = JOINT_ELBOW + side;
@@ -215,8 +223,9 @@ void figure_reach(figure_pose *pose, figure_side side, vec3 wrist, vec3 elbow_to
 
     // Both bones turn the shortest way from where they hang at rest: an arm has no twist to wring its sleeve.
     const vec3 upper = rest_bone(shoulder, elbow), lower = rest_bone(elbow, JOINT_WRIST + side);
-    const vec3 root = pose->positions[shoulder];
-    vec3 end = wrist;
+    const vec3 root = pose->positions[shoulder], straight_to = vec3_sub(wrist, root);
+    const float reach = eased_reach(length_of(straight_to), length_of(upper) + length_of(lower));
+    vec3 end = vec3_add(root, vec3_scale(vec3_normalize(straight_to), reach));
     const vec3 bent = middle_joint(root, &end, length_of(upper), length_of(lower), elbow_towards);
     const quat at_rest = pose->rotations[clavicle];
     const vec3 hanging = vec3_normalize(quat_rotate(at_rest, upper));
