@@ -9,7 +9,6 @@
 #include "tools/make_scenes_texture.h"
 
 #include <math.h>
-#include <stdlib.h>
 
 static const float pi = 3.14159265358979f;
 enum { LENGTH = 10, KEYS_PER_SECOND = 12, KEYS = LENGTH * KEYS_PER_SECOND + 1, KEYS_PER_BEAT = 5 };
@@ -158,7 +157,7 @@ static figure_pose stand_at(uint32_t dancer, float t)
     const float phase = dancers[dancer].phase, to_own = 1 / dancers[dancer].size;
     const place place = path_at(dancer, t);
     // Weight goes from foot to foot: the hips move over the one that stands, and drop on the other's side.
-    const float weight = sinf(pi * t / beat) * (dancer % 2 ? -1 : 1), bounce = cosf(2 * pi * t / beat);
+    const float weight = sinf(pi * t / beat) * partner_sign(dancer), bounce = cosf(2 * pi * t / beat);
     const vec3 sway = vec3_yaw((vec3){-0.035f * weight, 0, 0}, place.yaw);
     const float lean = couple->dance == DANCE_HAND_IN_HAND ? -0.07f : 0.02f;
     const float twist = 0.1f * weight + 0.08f * wave(t, 2, phase);
@@ -179,7 +178,7 @@ static figure_pose stand_at(uint32_t dancer, float t)
     }
     figure_pose pose = figure_stand(&stance);
     // The skirt lags behind the turn and swings against the hips.
-    const float swing = -0.12f * couple->turns / 2 - 0.12f * cosf(pi * t / beat) * (dancer % 2 ? -1 : 1);
+    const float swing = -0.12f * couple->turns / 2 - 0.12f * cosf(pi * t / beat) * partner_sign(dancer);
     pose.rotations[JOINT_SKIRT] =
         quat_multiply(pose.rotations[JOINT_HIPS], turned(swing, 0.03f * bounce, 0.04f * weight));
     return pose;
@@ -328,7 +327,7 @@ static void dancer_animate(gltf_file *file, gltf_clip clip, gltf_times times, ui
     static quat rotations[JOINT_COUNT][KEYS];
     vec3 hips[KEYS], flare[KEYS];
     for (int key = 0; key < KEYS; key++) {
-        // The last key is the first again, to the bit.
+        // The last key is the first pose again, to the bit but for rotations' sign.
         const float t = key == KEYS - 1 ? 0 : key_time(key);
         const figure_pose pose = pose_at(dancer, t);
         hips[key] = pose.positions[JOINT_HIPS];
@@ -408,9 +407,9 @@ static void ball_add(gltf_file *file, gltf_clip clip, gltf_times times)
     }
     mesh sphere = {.repeat = 0.4f};
     mesh_lathe_add(&sphere, profile, POINTS, 24);
-    const gltf_material leather = gltf_material_add(
+    const gltf_material cloth = gltf_material_add(
         file, &(gltf_material_desc){"ball", .texture = texture_add(file, "ball", texture_cloth_ochre, false)});
-    const gltf_mesh mesh = atrium_mesh_add(file, "ball", &sphere, leather);
+    const gltf_mesh mesh = atrium_mesh_add(file, "ball", &sphere, cloth);
 
     vec3 places[KEYS];
     quat spins[KEYS];
