@@ -156,6 +156,7 @@ static const struct {
 } scenes[] = {
     {"cornell.glb", cornell_build}, {"two_rooms.glb", two_rooms_build}, {"door.glb", door_build},
     {"atrium.glb", atrium_build},   {"lanterns.glb", lanterns_build},   {"lanterns_500.glb", lanterns_500_build},
+    {"dancers.glb", dancers_build},
 };
 
 int main(int argc, char **argv)

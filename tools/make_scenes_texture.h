@@ -28,6 +28,12 @@ texel texture_awning_blue(float u, float v);
 texel texture_awning_ochre(float u, float v);
 texel texture_leaves(float u, float v); // does not tile: a feathered frond in the left half, a broad leaf in the right
 
+// What figures wear, laid out as make_scenes_figure.h has it.
+texel texture_costume_waistcoat(float u, float v);
+texel texture_costume_braces(float u, float v);
+texel texture_costume_red_skirt(float u, float v);
+texel texture_costume_blue_skirt(float u, float v);
+
 // Draws 512 x 512 texels. With `has_alpha` the image is RGBA.
 gltf_texture texture_add(gltf_file *file, const char *name, texture_recipe recipe, bool has_alpha);
 // Draws the tangent-space normals of the recipe's heights, green up, where one repeat covers `repeat` metres.
