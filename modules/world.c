@@ -375,7 +375,8 @@ static bool instance_moved(const mesh_instance_gpu *instance)
            instance->previous_vertex != PREVIOUS_SAME;
 }
 
-// Fills this frame's instances in; `emitter_moved` is set when one with an emissive material moved. False: no memory.
+// Fills this frame's instances in, and notes whether any moved; `emitter_moved` is set when one with an emissive
+// material did. False: no memory.
 static bool instances_write(renderer *r, bool *emitter_moved)
 {
     world_gpu *w = r->gpu_world;
@@ -391,7 +392,9 @@ static bool instances_write(renderer *r, bool *emitter_moved)
     memory_reserve((void **)&w->instance_data, &w->state->data_capacity, w->instance_count, sizeof *w->instance_data);
     for (uint32_t i = 0; i < w->instance_count; i++) {
         w->instance_data[i] = instance_make(r, &w->order[i]);
-        *emitter_moved |= w->state->mesh_emits[w->order[i].mesh] && instance_moved(&w->instance_data[i]);
+        const bool moved = instance_moved(&w->instance_data[i]);
+        w->changes.instances |= moved;
+        *emitter_moved |= moved && w->state->mesh_emits[w->order[i].mesh];
     }
     memcpy(instances, w->instance_data, w->instance_count * sizeof *instances);
     tlas_instances_write(r, tlas_instances);
@@ -549,11 +552,11 @@ static void world_extract(ecs_world *world, void *user)
     if (emission_changed)
         meshes_find_emitters(r);
     bool emitter_moved = listed || emission_changed;
+    r->gpu_world->changes.instances = listed;
     r->failed |= !world_materials_extract(r) || !instances_write(r, &emitter_moved);
     if (r->failed)
         return;
     boxes_extract(r, listed, last_count);
-    r->gpu_world->changes.instances = listed || r->gpu_world->changes.box_count > 0;
     bounds_extract(r);
     r->failed |= !world_lights_extract(r, emitter_moved);
     world_materials_rest(r);
@@ -602,8 +605,8 @@ void world_fini(renderer *r)
     if (!w)
         return;
     world_lights_fini(r);
-    world_materials_fini(r);
     world_deform_fini(r);
+    world_materials_fini(r);
     const gpu_buffer buffers[] = {w->frame,      w->positions, w->attributes,    w->indices,
                                   w->primitives, w->instances, w->materials,     w->lights,
                                   w->emitters,   w->light_cdf, w->tlas_instances};

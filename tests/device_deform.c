@@ -652,6 +652,54 @@ TEST(motion_vectors_follow_the_vertices)
     scene_free(s);
 }
 
+// ---- What is drawn
+
+// Pixels that the grid covers, which faces the camera: 1 m is a quarter of the picture's height.
+static uint32_t pixels_drawn(renderer *r)
+{
+    static motion now[MOTION_SIZE * MOTION_SIZE];
+    CHECK(renderer_frame(r));
+    motion_read(r, now);
+    uint32_t drawn = 0;
+    for (uint32_t i = 0; i < MOTION_SIZE * MOTION_SIZE; i++)
+        drawn += now[i].drawn;
+    return drawn;
+}
+
+// Bounds, clusters and fronts are those of the deformed mesh, not of the one at rest.
+TEST(one_sided_meshes_are_drawn_where_they_are)
+{
+    deform_scene *s = scene_create((grid_desc){.cells = 16, .influences = 1, .flat = true});
+    s->nodes[FLOOR_NODE].mesh = s->nodes[MORPHED_NODE].mesh = SCENE_NONE;
+    s->materials[1].flags = 0;
+    render_settings settings = settings_small();
+    settings.width = settings.height = MOTION_SIZE;
+    renderer *r = renderer_of(device, &s->data, settings);
+    r->exports[r->export_count++] = "motion";
+    r->exports[r->export_count++] = "depth";
+    const render_camera front = {
+        .eye = {0, 0, 4}, .target = {0, 0, 0}, .up = {0, 1, 0}, .yfov = 2 * atanf(0.5f), .near_plane = 0.01f};
+    const uint32_t all = MOTION_SIZE * MOTION_SIZE / 4;
+    float *joint = matrix_of(r, FIRST_JOINT);
+    r->camera = front;
+    CHECK(pixels_drawn(r) == all);
+    joint[0] = joint[10] = -1; // half a turn about y
+    CHECK(pixels_drawn(r) == 0);
+    r->camera.eye[2] = -4;
+    CHECK(pixels_drawn(r) == all);
+    joint[12] = 10; // far from where it was
+    r->camera.eye[0] = r->camera.target[0] = 10;
+    CHECK(pixels_drawn(r) == all);
+    joint[10] = 1; // mirrored along x: its front is still +z
+    joint[12] = 0;
+    r->camera.eye[0] = r->camera.target[0] = 0;
+    CHECK(pixels_drawn(r) == 0);
+    r->camera = front;
+    CHECK(pixels_drawn(r) == all);
+    renderer_destroy(r);
+    scene_free(s);
+}
+
 // ---- Rays
 
 typedef struct nearest {
@@ -1060,6 +1108,7 @@ int main(int argc, char **argv)
     RUN(a_still_pose_is_deformed_once);
     RUN(morph_targets_without_weight_leave_the_vertices_alone);
     RUN(motion_vectors_follow_the_vertices);
+    RUN(one_sided_meshes_are_drawn_where_they_are);
     RUN(every_tracer_hits_the_deformed_triangles);
     RUN(light_paths_that_a_deforming_mesh_meets_are_traced_again);
     RUN(emissive_triangles_lie_on_the_deformed_ones);
