@@ -220,8 +220,15 @@ typedef struct gpu_triangles {
     uint32_t triangle_count;
     bool opaque; // false: candidates reach the shader (alpha mask)
 } gpu_triangles;
-// Builds a bottom-level structure over `count` geometries and waits. {0} on failure.
-gpu_acceleration gpu_blas_create(gpu *gpu, const gpu_triangles *geometries, uint32_t count);
+// Builds a bottom-level structure over `count` geometries and waits. `updatable`: keeps what gpu_blas_build needs.
+// {0} on failure.
+gpu_acceleration gpu_blas_create(gpu *gpu, const gpu_triangles *geometries, uint32_t count, bool updatable);
+// Records a build of an updatable structure over geometries that differ from those it was created with in their
+// positions alone. `update`: keeps its tree, as last built without, and fits the tree's boxes to the positions. Builds
+// of one structure, and of the top levels over it, need a gpu_build_barrier between them.
+void gpu_blas_build(gpu_commands *commands, gpu_acceleration blas, const gpu_triangles *geometries, uint32_t count,
+                    bool update);
+void gpu_build_barrier(gpu_commands *commands); // builds after it wait for those before it
 // Makes a top-level structure for at most `max_instances`, unbuilt.
 gpu_acceleration gpu_tlas_create(gpu *gpu, uint32_t max_instances);
 // Records a build from `count` VkAccelerationStructureInstanceKHR at the start of `instances`, a buffer with the usages

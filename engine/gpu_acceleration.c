@@ -1,4 +1,5 @@
-// Acceleration structures for ray queries: bottom levels built once, top levels rebuilt every frame.
+// Acceleration structures for ray queries: bottom levels built once, or again where their triangles move, and top
+// levels over them.
 #include "gpu_internal.h"
 
 #include <stdlib.h>
@@ -15,7 +16,9 @@ static acceleration_sizes sizes_query(gpu *gpu, const VkAccelerationStructureBui
     };
     gpu->vkGetAccelerationStructureBuildSizesKHR(gpu->device, VK_ACCELERATION_STRUCTURE_BUILD_TYPE_DEVICE_KHR, build,
                                                  primitive_counts, &sizes);
-    return (acceleration_sizes){sizes.accelerationStructureSize, sizes.buildScratchSize};
+    const VkDeviceSize scratch =
+        sizes.buildScratchSize > sizes.updateScratchSize ? sizes.buildScratchSize : sizes.updateScratchSize;
+    return (acceleration_sizes){sizes.accelerationStructureSize, scratch};
 }
 
 // Room is added for aligning the address within the buffer.
@@ -111,51 +114,120 @@ static VkAccelerationStructureGeometryKHR triangles_geometry(const gpu_triangles
     };
 }
 
-static bool blas_build(gpu *gpu, VkAccelerationStructureBuildGeometryInfoKHR *build,
-                       const VkAccelerationStructureBuildRangeInfoKHR *ranges, VkDeviceSize scratch_size)
-{
-    const gpu_buffer scratch = scratch_create(gpu, scratch_size);
-    if (!scratch.id)
-        return false;
-    build->scratchData.deviceAddress = scratch_address(gpu, scratch);
-    gpu_commands *commands = gpu_commands_begin(gpu);
-    gpu->vkCmdBuildAccelerationStructuresKHR(commands->handle, 1, build, &ranges);
-    const bool built = gpu_commands_submit_and_wait(gpu, commands);
-    gpu_buffer_destroy(gpu, scratch);
-    return built;
-}
+// What a build takes, an item a geometry.
+typedef struct blas_input {
+    VkAccelerationStructureGeometryKHR *geometries;
+    VkAccelerationStructureBuildRangeInfoKHR *ranges;
+    uint32_t *primitive_counts;
+    VkAccelerationStructureBuildGeometryInfoKHR build; // without its structures and scratch memory
+} blas_input;
 
-gpu_acceleration gpu_blas_create(gpu *gpu, const gpu_triangles *triangles, uint32_t count)
+static blas_input blas_input_make(const gpu_triangles *triangles, uint32_t count, bool updatable)
 {
     assert(count);
-    VkAccelerationStructureGeometryKHR *geometries = memory_alloc(count * sizeof *geometries);
-    VkAccelerationStructureBuildRangeInfoKHR *ranges = memory_alloc(count * sizeof *ranges);
-    uint32_t *primitive_counts = memory_alloc(count * sizeof *primitive_counts);
+    blas_input input = {
+        .geometries = memory_alloc(count * sizeof *input.geometries),
+        .ranges = memory_alloc(count * sizeof *input.ranges),
+        .primitive_counts = memory_alloc(count * sizeof *input.primitive_counts),
+    };
     for (uint32_t i = 0; i < count; i++) {
-        geometries[i] = triangles_geometry(&triangles[i]);
-        ranges[i].primitiveCount = primitive_counts[i] = triangles[i].triangle_count;
+        input.geometries[i] = triangles_geometry(&triangles[i]);
+        input.ranges[i].primitiveCount = input.primitive_counts[i] = triangles[i].triangle_count;
     }
-    VkAccelerationStructureBuildGeometryInfoKHR build = {
+    input.build = (VkAccelerationStructureBuildGeometryInfoKHR){
         .sType = VK_STRUCTURE_TYPE_ACCELERATION_STRUCTURE_BUILD_GEOMETRY_INFO_KHR,
         .type = VK_ACCELERATION_STRUCTURE_TYPE_BOTTOM_LEVEL_KHR,
-        .flags = VK_BUILD_ACCELERATION_STRUCTURE_PREFER_FAST_TRACE_BIT_KHR,
+        .flags = VK_BUILD_ACCELERATION_STRUCTURE_PREFER_FAST_TRACE_BIT_KHR |
+                 (updatable ? VK_BUILD_ACCELERATION_STRUCTURE_ALLOW_UPDATE_BIT_KHR : 0),
         .mode = VK_BUILD_ACCELERATION_STRUCTURE_MODE_BUILD_KHR,
         .geometryCount = count,
-        .pGeometries = geometries,
+        .pGeometries = input.geometries,
     };
-    const acceleration_sizes sizes = sizes_query(gpu, &build, primitive_counts);
-    gpu_acceleration blas = acceleration_create(gpu, build.type, sizes.storage);
+    return input;
+}
+
+static void blas_input_free(const blas_input *input)
+{
+    free(input->primitive_counts);
+    free(input->ranges);
+    free(input->geometries);
+}
+
+static void blas_build_record(gpu_commands *commands, const gpu_acceleration_object *blas, blas_input *input)
+{
+    gpu *gpu = commands->gpu;
+    const VkAccelerationStructureBuildRangeInfoKHR *ranges = input->ranges;
+    input->build.dstAccelerationStructure = blas->owned.acceleration;
+    input->build.scratchData.deviceAddress = scratch_address(gpu, blas->scratch);
+    gpu->vkCmdBuildAccelerationStructuresKHR(commands->handle, 1, &input->build, &ranges);
+}
+
+// Makes the structure with its scratch memory, and builds it.
+static gpu_acceleration blas_create(gpu *gpu, blas_input *input)
+{
+    const acceleration_sizes sizes = sizes_query(gpu, &input->build, input->primitive_counts);
+    const gpu_acceleration blas = acceleration_create(gpu, input->build.type, sizes.storage);
+    if (!blas.id)
+        return blas;
+    gpu_acceleration_object *object = acceleration_get(gpu, blas);
+    object->scratch = scratch_create(gpu, sizes.scratch);
+    if (object->scratch.id) {
+        gpu_commands *commands = gpu_commands_begin(gpu);
+        blas_build_record(commands, object, input);
+        if (gpu_commands_submit_and_wait(gpu, commands))
+            return blas;
+    }
+    gpu_acceleration_destroy(gpu, blas);
+    return (gpu_acceleration){0};
+}
+
+gpu_acceleration gpu_blas_create(gpu *gpu, const gpu_triangles *triangles, uint32_t count, bool updatable)
+{
+    blas_input input = blas_input_make(triangles, count, updatable);
+    const gpu_acceleration blas = blas_create(gpu, &input);
+    blas_input_free(&input);
     if (blas.id) {
-        build.dstAccelerationStructure = acceleration_get(gpu, blas)->owned.acceleration;
-        if (!blas_build(gpu, &build, ranges, sizes.scratch)) {
-            gpu_acceleration_destroy(gpu, blas);
-            blas = (gpu_acceleration){0};
+        gpu_acceleration_object *object = acceleration_get(gpu, blas);
+        object->updatable = updatable;
+        if (!updatable) {
+            gpu_buffer_destroy(gpu, object->scratch);
+            object->scratch = (gpu_buffer){0};
         }
     }
-    free(primitive_counts);
-    free(ranges);
-    free(geometries);
     return blas;
+}
+
+void gpu_blas_build(gpu_commands *commands, gpu_acceleration blas, const gpu_triangles *triangles, uint32_t count,
+                    bool update)
+{
+    const gpu_acceleration_object *object = acceleration_get(commands->gpu, blas);
+    assert(object->updatable);
+    blas_input input = blas_input_make(triangles, count, true);
+    if (update) {
+        input.build.mode = VK_BUILD_ACCELERATION_STRUCTURE_MODE_UPDATE_KHR;
+        input.build.srcAccelerationStructure = object->owned.acceleration;
+    }
+    blas_build_record(commands, object, &input);
+    blas_input_free(&input);
+}
+
+void gpu_build_barrier(gpu_commands *commands)
+{
+    const VkMemoryBarrier2 barrier = {
+        .sType = VK_STRUCTURE_TYPE_MEMORY_BARRIER_2,
+        .srcStageMask = VK_PIPELINE_STAGE_2_ACCELERATION_STRUCTURE_BUILD_BIT_KHR,
+        .srcAccessMask =
+            VK_ACCESS_2_ACCELERATION_STRUCTURE_READ_BIT_KHR | VK_ACCESS_2_ACCELERATION_STRUCTURE_WRITE_BIT_KHR,
+        .dstStageMask = VK_PIPELINE_STAGE_2_ACCELERATION_STRUCTURE_BUILD_BIT_KHR,
+        .dstAccessMask =
+            VK_ACCESS_2_ACCELERATION_STRUCTURE_READ_BIT_KHR | VK_ACCESS_2_ACCELERATION_STRUCTURE_WRITE_BIT_KHR,
+    };
+    const VkDependencyInfo dependency = {
+        .sType = VK_STRUCTURE_TYPE_DEPENDENCY_INFO,
+        .memoryBarrierCount = 1,
+        .pMemoryBarriers = &barrier,
+    };
+    vkCmdPipelineBarrier2(commands->handle, &dependency);
 }
 
 // ---- Top level
@@ -207,21 +279,7 @@ void gpu_tlas_build(gpu_commands *commands, gpu_acceleration tlas, gpu_buffer in
     gpu *gpu = commands->gpu;
     const gpu_acceleration_object *object = acceleration_get(gpu, tlas);
     assert(count <= object->max_instances);
-    // A second build in one command stream waits for the first one's use of the scratch buffer.
-    const VkMemoryBarrier2 barrier = {
-        .sType = VK_STRUCTURE_TYPE_MEMORY_BARRIER_2,
-        .srcStageMask = VK_PIPELINE_STAGE_2_ACCELERATION_STRUCTURE_BUILD_BIT_KHR,
-        .srcAccessMask = VK_ACCESS_2_ACCELERATION_STRUCTURE_WRITE_BIT_KHR,
-        .dstStageMask = VK_PIPELINE_STAGE_2_ACCELERATION_STRUCTURE_BUILD_BIT_KHR,
-        .dstAccessMask =
-            VK_ACCESS_2_ACCELERATION_STRUCTURE_READ_BIT_KHR | VK_ACCESS_2_ACCELERATION_STRUCTURE_WRITE_BIT_KHR,
-    };
-    const VkDependencyInfo dependency = {
-        .sType = VK_STRUCTURE_TYPE_DEPENDENCY_INFO,
-        .memoryBarrierCount = 1,
-        .pMemoryBarriers = &barrier,
-    };
-    vkCmdPipelineBarrier2(commands->handle, &dependency);
+    gpu_build_barrier(commands); // a second build in one command stream waits for the first one's use of the scratch
 
     const VkAccelerationStructureGeometryKHR geometry = instances_geometry(gpu_buffer_address(gpu, instances));
     VkAccelerationStructureBuildGeometryInfoKHR build = tlas_build_info(&geometry);

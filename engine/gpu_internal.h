@@ -71,8 +71,9 @@ typedef struct gpu_pipeline_object {
 typedef struct gpu_acceleration_object {
     gpu_owned owned;
     gpu_buffer storage;
-    gpu_buffer scratch; // top level only: rebuilt every frame
-    uint32_t max_instances;
+    gpu_buffer scratch; // of those that are built again
+    uint32_t max_instances; // top level
+    bool updatable; // bottom level
 } gpu_acceleration_object;
 
 struct gpu_commands {

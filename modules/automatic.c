@@ -288,13 +288,25 @@ static bool traces_in_time(const automatic *a, const render_settings *s)
     return s->vpls <= 1000 || a->vpl_scale * model_milliseconds(s, AUTOMATIC_VPLS) <= a->target_ms;
 }
 
+// Where the time is nearly right a choice goes only a little way from the last: the models are fitted there, and what
+// they say of settings far away is not worth the frames that it takes to find out.
+static bool is_near(const automatic *a, const render_settings *s)
+{
+    const double ms = automatic_milliseconds(a);
+    if (a->changes == 0 || ms > view_changed * a->target_ms || ms * view_changed < a->target_ms)
+        return true;
+    return fabs(log2((double)s->vpls / a->current.vpls)) <= 2.1 &&
+           fabs(log2((double)(s->alpha / a->current.alpha))) <= 0.6;
+}
+
 // What the fastest choice takes.
 static double milliseconds_least(const automatic *a)
 {
     double least = INFINITY;
     for (uint32_t i = 0; i < CHOICES; i++) {
         const render_settings s = choice_of(&a->current, i);
-        least = fmin(least, automatic_predict_milliseconds(a, &s));
+        if (is_near(a, &s))
+            least = fmin(least, automatic_predict_milliseconds(a, &s));
     }
     return least;
 }
@@ -307,7 +319,8 @@ static bool plan_within(const automatic *a, double most, render_settings *best)
     for (uint32_t i = 0; i < CHOICES; i++) {
         const render_settings s = choice_of(&a->current, i);
         double score = predict_score(a, &s);
-        if (score > best_score || !traces_in_time(a, &s) || automatic_predict_milliseconds(a, &s) > most)
+        if (score > best_score || !is_near(a, &s) || !traces_in_time(a, &s) ||
+            automatic_predict_milliseconds(a, &s) > most)
             continue;
         score *= 1 + 1e-3 * log(model_cost(&s));
         if (score < best_score) {

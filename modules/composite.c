@@ -74,9 +74,11 @@ static void composite_setup(renderer *r, void *user)
     frame_graph_import_image(r->graph, "white", state->white, ACCESS_SAMPLED, ACCESS_SAMPLED);
     if (r->settings.method != METHOD_LGH)
         return; // progressive makes the picture
-    composite_declare(r, state, "composite", "radiance", parts_of_radiance(r->settings.only));
-    composite_declare(r, state, "composite/aov_direct", "aov_direct", PART_DIRECT);
-    composite_declare(r, state, "composite/aov_indirect", "aov_indirect", PART_INDIRECT);
+    const uint32_t parts = parts_of_radiance(r->settings.only);
+    composite_declare(r, state, "composite", "radiance", parts);
+    composite_declare(r, state, "composite/aov_direct", "aov_direct", parts & PART_DIRECT);
+    composite_declare(r, state, "composite/aov_indirect", "aov_indirect",
+                      parts & (PART_INDIRECT | PART_INDIRECT_SHADOWS));
 }
 
 static void composite_fini(renderer *r, void *user)

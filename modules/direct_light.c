@@ -1,4 +1,5 @@
 // Direct light: few punctual lights exactly, with a shadow ray each; many of them, and emissive triangles, by samples.
+// Point lights that join the lighting grid hierarchy (renderer_light_slots) are left out: they are many more.
 #include "direct_light.h"
 #include "light_rays.h"
 #include "modules.h"
@@ -17,20 +18,26 @@ typedef struct direct_light {
     gpu_pipeline exact, sample, sample_analytic;
 } direct_light;
 
+// Those that did not join the hierarchy.
+static uint32_t punctual_lights(const renderer *r)
+{
+    return r->gpu_world->first_joined;
+}
+
 static bool has_direct(const renderer *r)
 {
     const bool shown = r->settings.only == ONLY_ALL || r->settings.only == ONLY_DIRECT;
-    return shown && r->settings.method != METHOD_PATH && r->constants.light_count + r->constants.emitter_count > 0;
+    return shown && r->settings.method != METHOD_PATH && punctual_lights(r) + r->constants.emitter_count > 0;
 }
 
 static bool has_many_punctual(const renderer *r)
 {
-    return r->constants.light_count > EXACT_LIGHTS_MAX;
+    return punctual_lights(r) > EXACT_LIGHTS_MAX;
 }
 
 static bool has_exact(const renderer *r)
 {
-    return has_direct(r) && r->constants.light_count > 0 && !has_many_punctual(r);
+    return has_direct(r) && punctual_lights(r) > 0 && !has_many_punctual(r);
 }
 
 bool direct_light_is_sampled(const renderer *r)
@@ -57,7 +64,7 @@ typedef struct direct_light_dispatch {
     uint32_t width, height;
     struct {
         uint32_t first, layers;
-        uint32_t samples, candidates, punctual; // of sampled light
+        uint32_t samples, candidates, punctual; // of sampled light: see direct_light_sample.glsl.h
     } push;
 } direct_light_dispatch;
 
@@ -119,7 +126,7 @@ static void sample_declare(renderer *r, const direct_light *state, light_rays ra
             .pipeline = analytic ? state->sample_analytic : state->sample,
             .push.samples = sample_count(r),
             .push.candidates = r->constants.emitter_count > EXACT_EMITTERS_MAX ? CANDIDATES_MANY : CANDIDATES_FEW,
-            .push.punctual = has_many_punctual(r),
+            .push.punctual = has_many_punctual(r) ? punctual_lights(r) : 0,
         };
         frame_graph_pass *pass = rays_pass_add(r, dispatch, &rays, counter);
         resource_chain_next(&unshadowed, pass);
@@ -133,7 +140,7 @@ static void direct_light_setup(renderer *r, void *user)
     const direct_light *state = user;
     light_rays exact = {0}, sampled = {0};
     if (has_exact(r))
-        exact = light_rays_begin(r, "direct_light", "direct", r->constants.light_count);
+        exact = light_rays_begin(r, "direct_light", "direct", punctual_lights(r));
     if (direct_light_is_sampled(r))
         sampled = light_rays_begin(r, "direct_light/sample", "direct_s", sampled_layers(r));
     if (exact.batches + sampled.batches == 0)

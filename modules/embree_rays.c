@@ -14,6 +14,13 @@ typedef struct masked_primitive { // what the filter of a geometry needs
     const mesh_primitive *primitive;
 } masked_primitive;
 
+typedef struct deformed_mesh { // of a deformation
+    uint32_t version; // of the vertices that its scene was committed with
+    bool at_rest; // the tree is the one over the triangles at rest
+    bool moved; // by the update that runs
+    float (*rest)[3]; // its positions at rest, padded for Embree; NULL until first instanced
+} deformed_mesh;
+
 typedef struct placed_mesh { // what an instance was when it was last committed
     RTCGeometry geometry;
     uint32_t mesh;
@@ -28,6 +35,8 @@ struct embree_rays {
     RTCDevice device;
     RTCScene *meshes; // NULL until first instanced
     masked_primitive *masks; // per primitive
+    uint32_t *mesh_deformations; // per mesh: index, or SCENE_NONE
+    deformed_mesh *deformed; // per deformation
     RTCScene instances; // geometry i: instance i
     placed_mesh *placed;
     size_t placed_capacity;
@@ -102,25 +111,98 @@ static RTCGeometry geometry_create(embree_rays *rays, const mesh_primitive *p)
         rtcSetGeometryIntersectFilterFunction(geometry, mask_filter);
         rtcSetGeometryOccludedFilterFunction(geometry, mask_filter);
     }
-    rtcCommitGeometry(geometry);
     return geometry;
 }
 
-// Geometries count as primitives do within their mesh; those without triangles leave a gap.
-static RTCScene mesh_create(embree_rays *rays, const scene_mesh *mesh)
+// Geometries count as primitives do within their mesh; those without triangles leave a gap. What deforms has a tree
+// whose boxes can be fitted to other positions, which Embree makes in dynamic scenes of low quality alone.
+static RTCScene mesh_create(embree_rays *rays, const scene_mesh *mesh, bool deforms)
 {
     RTCScene scene = rtcNewScene(rays->device);
+    if (deforms) {
+        rtcSetSceneBuildQuality(scene, RTC_BUILD_QUALITY_LOW);
+        rtcSetSceneFlags(scene, RTC_SCENE_FLAG_DYNAMIC);
+    }
     for (uint32_t i = 0; i < mesh->primitive_count; i++) {
         const mesh_primitive *p = &rays->scene->primitives[mesh->first_primitive + i];
         if (p->index_count < 3)
             continue;
         RTCGeometry geometry = geometry_create(rays, p);
+        rtcSetGeometryBuildQuality(geometry, deforms ? RTC_BUILD_QUALITY_REFIT : RTC_BUILD_QUALITY_MEDIUM);
+        rtcCommitGeometry(geometry);
         rtcAttachGeometryByID(scene, geometry, i);
         rtcReleaseGeometry(geometry);
     }
-    rtcCommitScene(scene);
+    if (!deforms)
+        rtcCommitScene(scene);
     return scene;
 }
+
+// ---- Deformations
+
+// Commits the mesh over `positions`, those of the scene's vertex `first`. `fit`: with the tree that it has.
+static void mesh_commit(embree_rays *rays, uint32_t index, const float (*positions)[3], uint32_t first, bool fit)
+{
+    const scene_mesh *mesh = &rays->scene->meshes[index];
+    for (uint32_t i = 0; i < mesh->primitive_count; i++) {
+        const mesh_primitive *p = &rays->scene->primitives[mesh->first_primitive + i];
+        if (p->index_count < 3)
+            continue;
+        RTCGeometry geometry = rtcGetGeometry(rays->meshes[index], i);
+        rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, positions,
+                                   (p->first_vertex - first) * sizeof *positions, sizeof *positions, p->vertex_count);
+        if (!fit) // other triangles, as far as Embree knows
+            rtcUpdateGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0);
+        rtcUpdateGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0);
+        rtcCommitGeometry(geometry);
+    }
+    rtcCommitScene(rays->meshes[index]);
+}
+
+// As modules/acceleration.c has it: the tree depends on the pose alone.
+static void mesh_follow(embree_rays *rays, uint32_t index, const world_deformation *now)
+{
+    const scene_deformation *d = &rays->scene->deformations[index];
+    deformed_mesh *mesh = &rays->deformed[index];
+    if (!now->stretched && !mesh->at_rest)
+        mesh_commit(rays, d->mesh, (const float(*)[3])mesh->rest, d->first_vertex, false);
+    mesh_commit(rays, d->mesh, rays->positions, 0, !now->stretched);
+    mesh->at_rest = !now->stretched;
+    mesh->version = now->version;
+    mesh->moved = true;
+}
+
+static void deformations_follow(embree_rays *rays, const world_deformation *deformations)
+{
+    for (uint32_t i = 0; i < rays->scene->deformation_count; i++) {
+        deformed_mesh *mesh = &rays->deformed[i];
+        mesh->moved = false;
+        if (mesh->rest && deformations[i].drawn && mesh->version != deformations[i].version)
+            mesh_follow(rays, i, &deformations[i]);
+    }
+}
+
+static void deformed_create(embree_rays *rays, uint32_t index, const world_deformation *now)
+{
+    enum { PADDING = 2 }; // positions: more than 16 bytes
+    const scene_deformation *d = &rays->scene->deformations[index];
+    deformed_mesh *mesh = &rays->deformed[index];
+    mesh->rest = memory_alloc((d->vertex_count + PADDING) * sizeof *mesh->rest);
+    memcpy(mesh->rest, rays->scene->positions + d->first_vertex, d->vertex_count * sizeof *mesh->rest);
+    mesh_follow(rays, index, now);
+}
+
+static void mesh_require(embree_rays *rays, uint32_t index, const world_deformation *deformations)
+{
+    if (rays->meshes[index])
+        return;
+    const uint32_t deformation = rays->mesh_deformations[index];
+    rays->meshes[index] = mesh_create(rays, &rays->scene->meshes[index], deformation != SCENE_NONE);
+    if (deformation != SCENE_NONE)
+        deformed_create(rays, deformation, &deformations[deformation]);
+}
+
+// ---- Life
 
 embree_rays *embree_rays_create(const scene_data *scene, const material *materials, const float (*positions)[3],
                                 const uint32_t *indices)
@@ -135,6 +217,11 @@ embree_rays *embree_rays_create(const scene_data *scene, const material *materia
     rtcSetDeviceErrorFunction(device, error_note, rays);
     rays->meshes = memory_alloc(max_u32(scene->mesh_count, 1) * sizeof *rays->meshes);
     rays->masks = memory_alloc(max_u32(scene->primitive_count, 1) * sizeof *rays->masks);
+    rays->mesh_deformations = memory_alloc(max_u32(scene->mesh_count, 1) * sizeof *rays->mesh_deformations);
+    memset(rays->mesh_deformations, 0xff, scene->mesh_count * sizeof *rays->mesh_deformations);
+    for (uint32_t i = 0; i < scene->deformation_count; i++)
+        rays->mesh_deformations[scene->deformations[i].mesh] = i;
+    rays->deformed = memory_alloc(max_u32(scene->deformation_count, 1) * sizeof *rays->deformed);
     rays->instances = rtcNewScene(device);
     rtcCommitScene(rays->instances);
     rays->pool = parallel_create(0);
@@ -153,6 +240,10 @@ void embree_rays_destroy(embree_rays *rays)
         if (rays->meshes[i])
             rtcReleaseScene(rays->meshes[i]);
     rtcReleaseDevice(rays->device);
+    for (uint32_t i = 0; i < rays->scene->deformation_count; i++)
+        free(rays->deformed[i].rest);
+    free(rays->deformed);
+    free(rays->mesh_deformations);
     free(rays->placed);
     free(rays->masks);
     free(rays->meshes);
@@ -175,15 +266,19 @@ static void placed_resize(embree_rays *rays, uint32_t count)
     }
 }
 
-// Whether anything changed.
+static bool mesh_moved(const embree_rays *rays, uint32_t mesh)
+{
+    const uint32_t deformation = rays->mesh_deformations[mesh];
+    return deformation != SCENE_NONE && rays->deformed[deformation].moved;
+}
+
+// Whether anything changed. The mesh exists.
 static bool placed_follow(embree_rays *rays, placed_mesh *placed, const mesh_instance_gpu *instance)
 {
-    if (placed->mesh == instance->mesh && memcmp(placed->world, instance->world, sizeof placed->world) == 0)
+    if (placed->mesh == instance->mesh && memcmp(placed->world, instance->world, sizeof placed->world) == 0 &&
+        !mesh_moved(rays, instance->mesh))
         return false;
-    RTCScene *mesh = &rays->meshes[instance->mesh];
-    if (!*mesh)
-        *mesh = mesh_create(rays, &rays->scene->meshes[instance->mesh]);
-    rtcSetGeometryInstancedScene(placed->geometry, *mesh);
+    rtcSetGeometryInstancedScene(placed->geometry, rays->meshes[instance->mesh]);
     rtcSetGeometryTransform(placed->geometry, 0, RTC_FORMAT_FLOAT3X4_ROW_MAJOR, instance->world);
     rtcCommitGeometry(placed->geometry);
     placed->mesh = instance->mesh;
@@ -191,12 +286,16 @@ static bool placed_follow(embree_rays *rays, placed_mesh *placed, const mesh_ins
     return true;
 }
 
-bool embree_rays_update(embree_rays *rays, const mesh_instance_gpu *instances, uint32_t count)
+bool embree_rays_update(embree_rays *rays, const mesh_instance_gpu *instances, uint32_t count,
+                        const world_deformation *deformations)
 {
     bool changed = rays->placed_count != count;
+    deformations_follow(rays, deformations);
     placed_resize(rays, count);
-    for (uint32_t i = 0; i < count; i++)
+    for (uint32_t i = 0; i < count; i++) {
+        mesh_require(rays, instances[i].mesh, deformations);
         changed |= placed_follow(rays, &rays->placed[i], &instances[i]);
+    }
     if (changed)
         rtcCommitScene(rays->instances);
     return !rays->failed;

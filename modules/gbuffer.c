@@ -1,5 +1,6 @@
 // What each pixel sees: rasterizes every primitive of every instance into depth, normals, albedo, emission and motion.
 #include "clusters.h"
+#include "deform.h"
 #include "modules.h"
 #include "world.h"
 
@@ -17,11 +18,12 @@ enum {
     NORMAL_TEXTURE = 1 << 3,
     VERTEX_COLORS = 1 << 4,
     MOVES = 1 << 5,
-    NEEDS = 6
+    DEFORMS = 1 << 6,
+    NEEDS = 7
 };
 
 typedef struct primitive_draws { // of one primitive, whatever its instances
-    uint32_t needs; // without MOVES
+    uint32_t needs; // without MOVES and DEFORMS
     uint32_t first_cluster;
 } primitive_draws;
 
@@ -172,11 +174,25 @@ static void clusters_draw(const frame_graph_context *context, const gbuffer_stat
     }
 }
 
+// Of what deforms: the clusters know it at rest only.
+static void primitive_draw(const frame_graph_context *context, const gbuffer_state *state, uint32_t primitive)
+{
+    const mesh_primitive *p = &state->r->scene->primitives[primitive];
+    gpu_draw_indexed(context->commands, state->corners, p->first_index, p->index_count);
+}
+
 static bool instance_moves(const frame_constants *c, const mesh_instance_gpu *instance)
 {
     return memcmp(instance->world, instance->previous_world, sizeof instance->world) != 0 ||
            memcmp(c->view_projection, c->previous_view_projection, sizeof c->view_projection) != 0 ||
            memcmp(c->eye, c->previous_eye, sizeof c->eye) != 0;
+}
+
+static uint32_t motion_needs(const frame_constants *c, const mesh_instance_gpu *instance)
+{
+    if (instance->previous_vertex != PREVIOUS_SAME)
+        return MOVES | DEFORMS;
+    return instance_moves(c, instance) ? MOVES : 0;
 }
 
 static int draw_compare(const void *left, const void *right)
@@ -201,7 +217,7 @@ static void draws_list(gbuffer_state *state)
     state->draw_count = 0;
     for (uint32_t i = 0; i < w->instance_count; i++) {
         const mesh_instance_gpu *instance = &w->instance_data[i];
-        const uint32_t moves = instance_moves(&r->constants, instance) ? MOVES : 0;
+        const uint32_t moves = motion_needs(&r->constants, instance);
         for (uint32_t k = 0; k < instance->primitive_count; k++) {
             const uint32_t primitive = instance->first_primitive + k;
             const placed_box b = box_place(instance, &w->primitive_boxes[primitive], r->constants.eye);
@@ -230,7 +246,10 @@ static void gbuffer_draw(const frame_graph_context *context, void *user)
         eye_of(v.instance, v.eye, v.mesh_eye);
         gpu_cull_set(context->commands, cull_of(v.instance, m));
         gpu_push(context->commands, push, sizeof push);
-        clusters_draw(context, state, &v, d->primitive, m->flags & MATERIAL_DOUBLE_SIDED);
+        if (world_deformation_of(r, v.instance->mesh))
+            primitive_draw(context, state, d->primitive);
+        else
+            clusters_draw(context, state, &v, d->primitive, m->flags & MATERIAL_DOUBLE_SIDED);
     }
 }
 
@@ -301,6 +320,7 @@ static void gbuffer_setup(renderer *r, void *user)
         const frame_graph_resource_desc image = frame_graph_image_of(targets[i].format, width, height);
         frame_graph_create_cleared(pass, targets[i].name, &image, ACCESS_COLOR_ATTACHMENT, zero);
     }
+    deform_read(pass);
 }
 
 static uint32_t needs_of(const scene_data *s, const mesh_primitive *p)

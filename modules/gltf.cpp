@@ -424,6 +424,7 @@ extern "C" void gltf_primitive_free(gltf_primitive *primitive)
     free(primitive->indices);
     free(primitive->influences);
     free(primitive->morphs);
+    free(primitive->tags);
 }
 
 extern "C" bool gltf_import(const char *path, scene_data *scene, gltf_primitive **primitives)

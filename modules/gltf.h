@@ -1,7 +1,7 @@
 // The glTF import's inner interface, for scene.c and gltf_*: a file goes through gltf_file.c (container, buffers),
-// gltf_json.c (checks), gltf.cpp, gltf_accessor.cpp, gltf_material.cpp, gltf_mesh.cpp, gltf_skin.cpp and
-// gltf_animation.cpp (tinygltf's structures to ours) and gltf_image.c (decoding); scene.c finishes what comes out, with
-// triangle_order.c. Others include scene.h.
+// gltf_json.c (checks), gltf.cpp, gltf_accessor.cpp, gltf_material.cpp, gltf_mesh.cpp, gltf_skin.cpp,
+// gltf_animation.cpp and gltf_subdivision.cpp (tinygltf's structures to ours) and gltf_image.c (decoding); scene.c
+// finishes what comes out, with scene_subdivision.c and triangle_order.c. Others include scene.h.
 #pragma once
 
 #include "scene.h"
@@ -68,6 +68,7 @@ typedef struct gltf_primitive { // a triangle list as it came, vertices only tho
     float (*positions)[3];
     vertex_attributes *attributes;
     uint32_t *indices; // in range; a multiple of three
+    uint32_t *tags; // a number that stays with its vertex, for scene_subdivision.c; NULL: none
     bool has_normals, has_tangents;
     scene_influences *influences; // [vertex_count]; NULL: no skin moves it
     uint32_t target_count;
@@ -85,6 +86,14 @@ void gltf_primitive_free(gltf_primitive *primitive);
 // Orders the triangles of a mesh for a BVH builder that halves the list of all of them: each primitive's indices in
 // place, and in sequence[count] the order in which the primitives have to follow each other.
 void mesh_triangles_reorder(gltf_primitive *primitives, uint32_t count, uint32_t *sequence);
+
+// ---- scene_subdivision.c
+
+// Adds a mesh for each level of the meshes that have rules; `primitives`, one for each of the scene's, grows with them.
+void scene_subdivide(scene_data *scene, gltf_primitive **primitives);
+// When the scene's vertices have their final places and deformations: stencils follow, and levels deform with their
+// cages.
+void scene_subdivisions_finish(scene_data *scene, const gltf_primitive *primitives);
 
 // ---- scene.c
 

@@ -6,6 +6,7 @@ extern "C" {
 #include "modules/gltf.h"
 }
 
+#include <array>
 #include <initializer_list>
 #include <stdexcept>
 #include <string>
@@ -109,6 +110,14 @@ void images_load(importer &in);
 void meshes_read(importer &in);
 uint32_t mesh_copy(importer &in, uint32_t mesh, const std::string &where); // `where` wants it
 void meshes_keep(importer &in); // once all are there
+
+// All positions that the primitive's accessor has, used or not.
+std::vector<std::array<float, 3>> positions_all(const importer &in, const tinygltf::Primitive &primitive,
+                                                const std::string &where);
+
+// ---- gltf_subdivision.cpp
+// What the mesh's extras say; NULL when they say nothing, or something wrong, which is a warning.
+const scene_subdivision_rules *subdivision_rules_read(importer &in, size_t mesh);
 
 // ---- gltf_skin.cpp
 void skins_read(importer &in); // before the meshes

@@ -458,6 +458,21 @@ void skipped_warn(const importer &in)
 
 } // namespace
 
+std::vector<std::array<float, 3>> positions_all(const importer &in, const tinygltf::Primitive &primitive,
+                                                const std::string &where)
+{
+    const auto position = primitive.attributes.find("POSITION");
+    if (position == primitive.attributes.end()) {
+        return {};
+    }
+    const accessor_reader reader(in, accessor_use(in, position->second, position_rule, where));
+    std::vector<std::array<float, 3>> positions(reader.accessor.count);
+    for (uint32_t i = 0; i < positions.size(); i++) {
+        reader.numbers(i, positions[i].data());
+    }
+    return positions;
+}
+
 void meshes_read(importer &in)
 {
     totals_check(in);
@@ -468,6 +483,7 @@ void meshes_read(importer &in)
         out.name = in.keep(mesh.name);
         out.first_primitive = static_cast<uint32_t>(in.primitives.size());
         out.deformation = SCENE_NONE;
+        out.subdivision_rules = subdivision_rules_read(in, i);
         for (size_t k = 0; k < mesh.primitives.size(); k++) {
             primitive_read(in, mesh.primitives[k], primitive_label(in, i, k),
                            skin == SCENE_NONE ? nullptr : &in.scene->skins[skin]);

@@ -656,9 +656,10 @@ static uint32_t log2_floor(uint32_t x)
 // Finest candidate. In a room the lights' surfaces fill several times cells^2 vertices, so sqrt(N) / 4 cells would do;
 // halls, lines and spot-lit patches stay below N / 2 on finer grids. A grid too fine for any of them costs memory, and
 // time in the frames that choose anew.
-static uint32_t exponent_of(const render_settings *s)
+static uint32_t exponent_of(const renderer *r)
 {
-    const uint32_t exponent = s->levels > 0 ? max_u32(s->levels - 1, 1) : log2_floor(s->vpls) / 2 + 2;
+    const render_settings *s = &r->settings;
+    const uint32_t exponent = s->levels > 0 ? max_u32(s->levels - 1, 1) : log2_floor(renderer_slots(r)) / 2 + 2;
     return min_u32(exponent, LGH_EXPONENTS - 1);
 }
 
@@ -668,11 +669,11 @@ static lgh_signature signature_of(const renderer *r)
     const uint32_t s1 = s->build == LGH_BUILD_SCATTER ? LGH_S1_ATOMIC : s->s1;
     const bool by_cell = s->end_point == END_POINT_VPL || (s->start_level == 0 && s->lighting == LIGHTING_GATHER);
     return (lgh_signature){
-        .slots = s->vpls,
-        .exponent = exponent_of(s),
+        .slots = renderer_slots(r),
+        .exponent = exponent_of(r),
         .levels = s->levels,
         .grid = s->grid,
-        .capacity = lgh_capacity(s),
+        .capacity = lgh_capacity(r),
         .interleave = s->interleave,
         .build = s->build,
         .s1 = s1,
@@ -799,10 +800,11 @@ uint32_t lgh_cells_before(uint32_t exponent)
     return words;
 }
 
-uint32_t lgh_capacity(const render_settings *s)
+uint32_t lgh_capacity(const renderer *r)
 {
+    const uint32_t slots = renderer_slots(r), levels = r->settings.levels;
     const uint32_t largest = (128u << 20) / sizeof(grid_light); // one binding's range
-    const uint64_t asked = s->levels > 0 ? 8ull * s->vpls * s->levels : s->vpls;
+    const uint64_t asked = levels > 0 ? 8ull * slots * levels : slots;
     return (uint32_t)(asked < 4096 ? 4096 : asked > largest ? largest : asked);
 }
 

@@ -22,7 +22,8 @@ typedef struct light_gather {
     gpu_pipeline mark, plan, lists[2];
     // Made when first used.
     gpu_pipeline pack[EMISSIONS][2]; // [emission][VPLs]
-    gpu_pipeline gather[EMISSIONS][2][2][2][2][SAMPLES_MAX + 1]; // [emission][blend][uniform][count][VPLs][samples]
+    // [emission][blend][uniform][count][VPLs][lights][samples]
+    gpu_pipeline gather[EMISSIONS][2][2][2][2][2][SAMPLES_MAX + 1];
 } light_gather;
 
 typedef struct gather_push { // push_block in light_gather.glsl.h
@@ -68,9 +69,9 @@ static gpu_pipeline pack_pipeline(renderer *r, light_gather *state, bool vpls)
 static gpu_pipeline gather_pipeline(renderer *r, light_gather *state, uint32_t samples)
 {
     const uint32_t emission = r->settings.emission, uniform = r->settings.sampling == SAMPLING_UNIFORM,
-                   vpls = r->settings.start_level == 0, blend = r->settings.blend;
-    const uint32_t constants[] = {emission, uniform, r->count_lights, samples, vpls, blend == BLEND_PAPER};
-    return pipeline_of(r, &state->gather[emission][blend][uniform][r->count_lights][vpls][samples],
+                   vpls = r->settings.start_level == 0, blend = r->settings.blend, lights = renderer_light_slots(r) > 0;
+    const uint32_t constants[] = {emission, uniform, r->count_lights, samples, vpls, blend == BLEND_PAPER, lights};
+    return pipeline_of(r, &state->gather[emission][blend][uniform][r->count_lights][vpls][lights][samples],
                        &shader_light_gather_comp, constants, countof(constants));
 }
 
@@ -220,8 +221,8 @@ static void light_gather_setup(renderer *r, void *state)
     const gather_pass pass = {
         .width = s->width,
         .height = s->height,
-        .push = {s->interleave, s->start_level, coarser_of(s->alpha), entry_capacity(r), lgh_capacity(s), s->vpls,
-                 !s->sample_s1, s->alpha, renderer_singularity(r)},
+        .push = {s->interleave, s->start_level, coarser_of(s->alpha), entry_capacity(r), lgh_capacity(r),
+                 renderer_slots(r), !s->sample_s1, s->alpha, renderer_singularity(r)},
     };
     declare_pack(r, state, pass);
     declare_mark(r, state, pass);
@@ -236,7 +237,7 @@ static void light_gather_fini(renderer *r, void *state)
     gpu_pipeline_destroy(r->gpu, g->plan);
     for (size_t i = 0; i < countof(g->lists); i++)
         gpu_pipeline_destroy(r->gpu, g->lists[i]);
-    gpu_pipeline *const packs = g->pack[0], *const gathers = g->gather[0][0][0][0][0];
+    gpu_pipeline *const packs = g->pack[0], *const gathers = g->gather[0][0][0][0][0][0];
     for (size_t i = 0; i < sizeof g->pack / sizeof *packs; i++)
         gpu_pipeline_destroy(r->gpu, packs[i]);
     for (size_t i = 0; i < sizeof g->gather / sizeof *gathers; i++)

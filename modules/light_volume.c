@@ -177,7 +177,7 @@ static void declare_volumes(renderer *r, light_volume *state, volume_draw draw, 
     volume_pass pass = {
         .pipeline = pipeline_of(r, state, top, variant),
         .push = {draw, s->interleave, s->emission, s->start_level, samples_of(r), lowest && !s->sample_s1 ? 2 : 1,
-                 renderer_singularity(r), s->vpls},
+                 renderer_singularity(r), renderer_slots(r)},
     };
     frame_graph_pass *p = add_pass(r, volume_steps[draw].name, execute_volumes, &pass);
     frame_graph_read(p, "lgh_header", ACCESS_STORAGE_READ);

@@ -9,7 +9,9 @@ bool modules_init(renderer *r)
         automatic_init, // between frames: chooses settings for a time or an error
         rays_init, // traces the batches of rays that the other passes make
         light_rays_init, // sums up the light of the shadow rays that nothing is in the way of
-        acceleration_init, // top-level acceleration structure over the instances
+        subdivide_init, // levels of the subdivided meshes, by their size in the picture
+        deform_init, // skins and morph targets: vertices that change
+        acceleration_init, // acceleration structures that follow the deformed meshes and the instances
         vpl_trace_init, // light paths, one virtual point light a bounce
         lgh_build_init, // the lighting grid hierarchy over the VPLs
         gbuffer_init, // what each pixel sees

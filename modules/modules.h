@@ -9,6 +9,8 @@ bool animation_init(renderer *r);
 bool automatic_init(renderer *r);
 bool rays_init(renderer *r);
 bool light_rays_init(renderer *r);
+bool subdivide_init(renderer *r);
+bool deform_init(renderer *r);
 bool acceleration_init(renderer *r);
 bool vpl_trace_init(renderer *r);
 bool lgh_build_init(renderer *r);

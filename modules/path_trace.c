@@ -7,6 +7,7 @@
 //
 // Paths advance together, a vertex at a time: a frame's paths are layers of one path a pixel, path = layer * pixels +
 // pixel. Random numbers are keyed by pixel, sample and vertex, so a picture does not depend on how many a frame takes.
+#include "deform.h"
 #include "modules.h"
 #include "progressive.h"
 #include "rays.h"
@@ -170,6 +171,7 @@ static void vertex_declare(renderer *r, const path_trace *state, path_step step,
     resource_chain_next(&chains->states, pass);
     scatter_declare(r, pass, &step);
     resource_chain_next(&chains->counter, pass);
+    deform_read(pass);
     rays_declare(r, &step);
 }
 
@@ -182,6 +184,7 @@ static void add_declare(renderer *r, const path_trace *state, path_step step)
     arrive_declare(pass, last);
     frame_graph_read(pass, "path_states", ACCESS_STORAGE_READ);
     frame_graph_modify(pass, "sums_before", "sums", ACCESS_STORAGE_READ_WRITE);
+    deform_read(pass);
 }
 
 static void path_trace_setup(renderer *r, void *user)

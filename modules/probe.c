@@ -24,7 +24,7 @@ typedef struct probe_dispatch {
     uint32_t groups;
     union {
         struct {
-            uint32_t slots, second_half, first;
+            uint32_t slots, second_half, lights, first;
             float singularity;
         } rays;
         uint32_t count;
@@ -39,7 +39,7 @@ static probe_state *state_of(const renderer *r)
 
 uint32_t probe_count(const renderer *r)
 {
-    const uint32_t fit = VPL_SUMS / max_u32(1, renderer_vpl_slots(r));
+    const uint32_t fit = VPL_SUMS / max_u32(1, renderer_slots(r));
     return max_u32(PROBES_MIN, min_u32(PROBES_MAX, fit)) * (r->settings.target_error > 0 ? ERROR_FACTOR : 1);
 }
 
@@ -64,7 +64,7 @@ static void rays_declare(renderer *r, const probe_state *state, uint32_t count)
     const probe_dispatch d = {
         .pipeline = state->rays,
         .groups = count,
-        .push.rays = {slots, slots / bounces / 2 * bounces, state->next, renderer_singularity(r)},
+        .push.rays = {renderer_slots(r), slots / bounces / 2 * bounces, slots, state->next, renderer_singularity(r)},
         .push_size = sizeof d.push.rays,
     };
     const frame_graph_resource_desc probes = {.kind = FRAME_GRAPH_BUFFER, .size = count * sizeof(probe), .host = true};

@@ -63,6 +63,15 @@ static uint64_t settings_hash(uint64_t hash, const render_settings *settings)
     return hash;
 }
 
+static uint64_t pose_hash(uint64_t hash, const renderer *r, uint32_t index)
+{
+    const scene_deformation *d = &r->scene->deformations[index];
+    const world_deformation *now = &r->gpu_world->deformations[index];
+    const uint32_t joints = d->skin == SCENE_NONE ? 0 : r->scene->skins[d->skin].joint_count;
+    hash = hash_add(hash, now->joints, joints * sizeof *now->joints);
+    return hash_add(hash, now->weights, d->target_count * sizeof *now->weights);
+}
+
 static uint64_t key_of(const renderer *r)
 {
     const world_gpu *w = r->gpu_world;
@@ -78,6 +87,8 @@ static uint64_t key_of(const renderer *r)
         hash = hash_add(hash, w->instance_data[i].world, sizeof w->instance_data[i].world);
         hash = hash_add(hash, &w->instance_data[i].mesh, sizeof w->instance_data[i].mesh);
     }
+    for (uint32_t i = 0; i < r->scene->deformation_count; i++)
+        hash = pose_hash(hash, r, i);
     return hash;
 }
 

@@ -265,7 +265,7 @@ static void scene_update(const frame_graph_context *context, void *user)
     (void)context;
     renderer *r = user;
     const world_gpu *w = r->gpu_world;
-    r->failed |= !embree_rays_update(state_of(r)->embree, w->instance_data, w->instance_count);
+    r->failed |= !embree_rays_update(state_of(r)->embree, w->instance_data, w->instance_count, w->deformations);
 }
 
 static void embree_make(renderer *r, rays_state *state)
@@ -361,6 +361,7 @@ static void rays_setup(renderer *r, void *user)
         &(frame_graph_pass_desc){.name = "rays/scene", .kind = FRAME_GRAPH_HOST, .execute = scene_update, .user = r});
     const frame_graph_resource_desc token = {.kind = FRAME_GRAPH_BUFFER, .size = 16, .host = true};
     frame_graph_create_resource(pass, scene_token, &token, ACCESS_HOST_WRITE);
+    frame_graph_read(pass, "positions|-", ACCESS_HOST_READ); // what the GPU deforms
 }
 
 static void rays_fini(renderer *r, void *user)

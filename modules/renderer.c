@@ -36,20 +36,30 @@ static render_camera camera_of_bounds(const renderer *r)
     return camera;
 }
 
+static const float *node_local(const renderer *r, uint32_t node)
+{
+    const node_component *component = ecs_get(r->world, r->gpu_world->node_entities[node], r->gpu_world->node);
+    return component ? component->matrix : r->scene->nodes[node].matrix;
+}
+
 // Where the scene's node stands by the node components of it and its parents: before the transforms of the next frame
 // are made. As the loader multiplies them, so that a node that nothing moved is where the loader put it.
 static void node_world(const renderer *r, uint32_t node, float world[16])
 {
-    const scene_node *source = &r->scene->nodes[node];
-    const node_component *component = ecs_get(r->world, r->gpu_world->node_entities[node], r->gpu_world->node);
-    const float *local = component ? component->matrix : source->matrix;
-    if (source->parent == SCENE_NONE) {
-        memcpy(world, local, 16 * sizeof(float));
-        return;
+    const scene_node *nodes = r->scene->nodes;
+    uint32_t depth = 0;
+    for (uint32_t i = node; i != SCENE_NONE; i = nodes[i].parent)
+        depth++;
+    uint32_t *chain = memory_alloc(depth * sizeof *chain); // from the root
+    for (uint32_t i = node, k = depth; i != SCENE_NONE; i = nodes[i].parent)
+        chain[--k] = i;
+    memcpy(world, node_local(r, chain[0]), 16 * sizeof(float));
+    for (uint32_t k = 1; k < depth; k++) {
+        float parent[16];
+        memcpy(parent, world, sizeof parent);
+        scene_matrix_multiply(parent, node_local(r, chain[k]), world);
     }
-    float parent[16];
-    node_world(r, source->parent, parent);
-    scene_matrix_multiply(parent, local, world);
+    free(chain);
 }
 
 render_camera renderer_camera_of_scene(const renderer *r, uint32_t index)
@@ -212,6 +222,16 @@ bool renderer_has_vpls(const renderer *r)
 bool renderer_has_indirect(const renderer *r)
 {
     return r->settings.method == METHOD_LGH && renderer_has_vpls(r);
+}
+
+uint32_t renderer_light_slots(const renderer *r)
+{
+    return renderer_has_indirect(r) ? r->gpu_world->light_slots.count : 0;
+}
+
+uint32_t renderer_slots(const renderer *r)
+{
+    return renderer_vpl_slots(r) + renderer_light_slots(r);
 }
 
 bool renderer_has_shadows(const renderer *r)

@@ -11,8 +11,9 @@
 // Names in the frame graph (images are width x height unless said otherwise; light is "radiance over albedo": what a
 // white Lambertian surface would send out, in nits, so that radiance = albedo * light):
 //
+//   positions, attributes, previous_positions  buffers of the scene set, where it deforms meshes: see deform.h  deform
 //   tlas               acceleration  the scene, for ray queries                        acceleration
-//   vpls               vpl[slots]    see renderer_vpl_slots          vpl_trace; vpl_reference where it keeps them
+//   vpls               vpl[slots]    see renderer_slots              vpl_trace; vpl_reference where it keeps them
 //   lgh_header         lgh_header                                                      lgh_build
 //   lgh_lights         grid_light[]  merged, top level first                           lgh_build
 //   lgh_sums           lgh_sums[]    the same order; with lgh_masks, lgh_ranks, lgh_vertices: see shaders/lgh.glsl.h
@@ -26,7 +27,8 @@
 //   direct             RGBA32F       light of the punctual lights that are shadowed one by one   direct_light
 //   direct_u, direct_s RGBA32F       unshadowed and shadowed estimate of sampled direct light, where there is any
 //   direct_analytic    RGBA32F       its unshadowed light without noise, where that is known
-//   indirect           RGBA32F       unshadowed; a: sum of the weights f; tiled when interleaved
+//   indirect           RGBA32F       unshadowed, of VPLs and the point lights among them (renderer_light_slots); a: sum
+//                                    of the weights f; tiled when interleaved
 //                                    (by light_gather or light_volume, like the next two)
 //   lights_per_pixel   R32F          lights with a non-zero blending function; tiled like `indirect`
 //   reservoirs         buffer        shadow samples a pixel: uint[k + 1], a sum's bits and k lights; light_volume's
@@ -53,6 +55,7 @@
 //   probes             probe[]       see modules/probe.h                               probe
 //   vpl_flux           vec3[paths]   of the traced light paths at their last hit                      vpl_trace
 //   vpl_changed        uint[]        a bit a slot, where not all VPLs are traced anew; see vpl_trace.h  vpl_trace
+//   vpl_slot_lights    uint[]        light of each light slot, or LIGHT_SLOT_EMPTY                     vpl_trace
 //   vpl_mask, vpl_list bits and numbers of the paths that are; vpl_shares, vpl_sources, vpl_elements: see
 //   shaders/shared.h
 #pragma once
@@ -122,6 +125,11 @@ entity renderer_pass_find(const renderer *r, const char *name); // {0} when ther
 bool renderer_has_vpls(const renderer *r); // settings ask for indirect light by VPLs, and there are VPLs and lights
 bool renderer_has_indirect(const renderer *r); // and the lighting grid hierarchy gathers them
 uint32_t renderer_vpl_slots(const renderer *r); // settings' vpls, or ir_vpls
+// Behind them, where more than settings' many_lights point lights are in the scene: slots for these. They have the
+// normal 0 and radiate evenly, and their light, direct though it is, is in `indirect` and what is made of it. Only
+// where the whole light is rendered: --only, `vpl` and `path` know direct light as such.
+uint32_t renderer_light_slots(const renderer *r);
+uint32_t renderer_slots(const renderer *r); // both
 bool renderer_has_shadows(const renderer *r); // indirect light with shadow samples
 // b in metres: no light's singularity is closer than this.
 float renderer_singularity(const renderer *r);

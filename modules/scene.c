@@ -130,6 +130,9 @@ static void vertices_unshare(gltf_primitive *p)
 {
     p->positions = corners_take(p->positions, p, sizeof(*p->positions));
     p->attributes = corners_take(p->attributes, p, sizeof(*p->attributes));
+    if (p->tags) {
+        p->tags = corners_take(p->tags, p, sizeof(*p->tags));
+    }
     if (p->influences) {
         p->influences = corners_take(p->influences, p, sizeof(*p->influences));
     }
@@ -287,6 +290,9 @@ static void vertices_renumber(gltf_primitive *p)
     meshopt_remapIndexBuffer(p->indices, p->indices, p->index_count, remap);
     meshopt_remapVertexBuffer(p->positions, p->positions, p->vertex_count, sizeof(*p->positions), remap);
     meshopt_remapVertexBuffer(p->attributes, p->attributes, p->vertex_count, sizeof(*p->attributes), remap);
+    if (p->tags) {
+        meshopt_remapVertexBuffer(p->tags, p->tags, p->vertex_count, sizeof(*p->tags), remap);
+    }
     if (p->influences) {
         meshopt_remapVertexBuffer(p->influences, p->influences, p->vertex_count, sizeof(*p->influences), remap);
     }
@@ -616,11 +622,13 @@ scene_data *scene_load(const char *path)
     if (!gltf_import(path, scene, &primitives)) {
         goto fail;
     }
+    scene_subdivide(scene, &primitives);
     primitives_finish(scene, primitives);
     primitives_concatenate(scene, primitives);
     for (uint32_t i = 0; i < scene->deformation_count; i++) {
         deformation_finish(scene, &scene->deformations[i], primitives);
     }
+    scene_subdivisions_finish(scene, primitives);
     for (uint32_t i = 0; i < scene->primitive_count; i++) {
         gltf_primitive_free(&primitives[i]);
     }
@@ -713,6 +721,18 @@ static void print_cameras(const scene_data *scene, FILE *out)
     }
 }
 
+static void print_subdivisions(const scene_data *scene, FILE *out)
+{
+    for (uint32_t i = 0; i < scene->subdivision_count; i++) {
+        const scene_subdivision *const s = &scene->subdivisions[i];
+        const scene_mesh *const coarse = &scene->meshes[s->levels[0].mesh],
+                                *const fine = &scene->meshes[s->levels[s->level_count - 1].mesh];
+        fprintf(out, "subdivided: \"%s\", levels 1 to %u, %llu to %llu triangles\n", scene->meshes[s->mesh].name,
+                s->level_count, (unsigned long long)mesh_triangle_count(scene, coarse),
+                (unsigned long long)mesh_triangle_count(scene, fine));
+    }
+}
+
 static void print_motion(const scene_data *scene, FILE *out)
 {
     fprintf(out, "animations: %u\n", scene->animation_count);
@@ -724,9 +744,16 @@ static void print_motion(const scene_data *scene, FILE *out)
     for (uint32_t i = 0; i < scene->skin_count; i++) {
         fprintf(out, "  \"%s\": %u joints\n", scene->skins[i].name, scene->skins[i].joint_count);
     }
-    fprintf(out, "deformed meshes: %u\n", scene->deformation_count);
+    uint32_t levels = 0;
+    for (uint32_t i = 0; i < scene->deformation_count; i++) {
+        levels += scene->deformations[i].subdivision != NULL;
+    }
+    fprintf(out, "deformed meshes: %u\n", scene->deformation_count - levels);
     for (uint32_t i = 0; i < scene->deformation_count; i++) {
         const scene_deformation *const deformation = &scene->deformations[i];
+        if (deformation->subdivision) {
+            continue;
+        }
         fprintf(out, "  \"%s\" of node \"%s\": %u vertices, %s, %u morph targets\n",
                 scene->meshes[deformation->mesh].name, scene->nodes[deformation->node].name, deformation->vertex_count,
                 deformation->skin == SCENE_NONE ? "no skin" : "a skin", deformation->target_count);
@@ -742,6 +769,7 @@ void scene_print_info(const scene_data *scene, FILE *out)
     fprintf(out, "scene: %s\n", scene->path);
     fprintf(out, "triangles: %u (%llu with instances)\n", scene->index_count / 3,
             (unsigned long long)scene->instanced_triangles);
+    print_subdivisions(scene, out);
     fprintf(out, "vertices: %u\n", scene->vertex_count);
     fprintf(out, "meshes: %u (%u primitives, %u instances)\n", scene->mesh_count, scene->primitive_count, instances);
     fprintf(out, "materials: %u\n", scene->material_count - 1); // without the default one

@@ -3,6 +3,7 @@
 
 #include "engine/base.h"
 #include "shaders/shared.h"
+#include "subdivision.h"
 
 #include <stdio.h>
 
@@ -23,7 +24,51 @@ typedef struct scene_mesh {
     const char *name;
     uint32_t first_primitive, primitive_count;
     uint32_t deformation; // SCENE_NONE: its vertices never change
+    const struct scene_subdivision_rules *subdivision_rules; // NULL: it is drawn as it is
 } scene_mesh;
+
+// ---- Subdivision. A mesh is a control cage where its glTF `extras` say so:
+//
+//     "extras": {"lanternfield_subdivision": {
+//         "scheme": "catmark",         or "loop"
+//         "max_level": 3,              1 to 5; the default is 3
+//         "boundary": "edge",          or "edge_and_corner", the default
+//         "creases": [[0, 1, 10.0]]    edges by two indices into POSITION of the mesh's first primitive; sharpness
+//     }}                               0 (smooth) to 10 (sharp for ever)
+//
+// Vertices at the same position are one vertex of the cage, over all primitives; their texture coordinates and colours
+// become face-varying, their normals and tangents are not used. In a catmark cage two triangles that follow each other
+// in a primitive are one quad when they share an edge, position and texture coordinates alike, their normals are at
+// most 30 degrees apart and the quad is convex seen along their mean. What is wrong with the extras or the cage (an
+// edge with three faces, a triangle without area, ...) is a warning that names the mesh, which is then drawn as it is.
+
+typedef struct scene_crease {
+    float ends[2][3]; // positions
+    float sharpness;
+} scene_crease;
+
+typedef struct scene_subdivision_rules { // what the extras say
+    subdivision_scheme scheme;
+    subdivision_boundary boundary;
+    uint32_t max_level;
+    const scene_crease *creases;
+    uint32_t crease_count;
+} scene_subdivision_rules;
+
+typedef struct scene_subdivision_level {
+    uint32_t mesh; // refined, with primitives, vertices and indices of its own; no node of the scene has it
+    uint32_t first_vertex, vertex_count; // of all its primitives, one after the other
+    const subdivision_vertex *vertices; // [vertex_count]
+} scene_subdivision_level;
+
+typedef struct scene_subdivision { // a mesh that may be drawn as one of its levels instead
+    uint32_t mesh; // the cage, as it came
+    uint32_t first_vertex; // of the cage's mesh, from which the stencils' entries count
+    subdivision_stencils stencils;
+    scene_subdivision_level levels[SUBDIVISION_LEVELS_MAX]; // [0] is level 1
+    uint32_t level_count;
+    float edge_length; // of the cage, root mean square, in mesh space
+} scene_subdivision;
 
 // ---- Deformation. A node whose mesh is skinned or morphed has a mesh of its own, so that each has vertices of its own
 // to change. Vertices and attributes of the scene are those at rest: the mesh as it came.
@@ -46,6 +91,11 @@ typedef struct scene_deformation {
     uint32_t target_count;
     const scene_morph *morphs; // [target][vertex]
     const float *weights; // [target]: at rest, the node's or else the mesh's
+    // A level of a subdivided mesh follows the deformation of its cage, which comes before it. Node and skin are the
+    // cage's; influences and targets it has none. NULL: the mesh is no level.
+    const struct scene_subdivision *subdivision;
+    uint32_t level; // from 1
+    uint32_t cage; // deformation
 } scene_deformation;
 
 typedef struct scene_skin {
@@ -158,6 +208,8 @@ typedef struct scene_data {
     uint32_t skin_count;
     scene_deformation *deformations;
     uint32_t deformation_count;
+    scene_subdivision *subdivisions;
+    uint32_t subdivision_count;
     uint64_t instanced_triangles; // over all nodes
     float bounds_min[3], bounds_max[3]; // world, over all nodes' meshes; both 0 when there is no geometry;
                                         // transformed boxes, so larger than need be where nodes are rotated

@@ -2,6 +2,7 @@
 #include "settings.h"
 
 #include "shaders/shared.h"
+#include "subdivision.h"
 
 #include <ctype.h>
 #include <stdio.h>
@@ -21,6 +22,7 @@ render_settings render_settings_default(void)
         .ray_budget = 0,
         .vpls = 100000,
         .bounces = 3,
+        .many_lights = 256,
         .alpha = 1,
         .levels = 0,
         .grid = GRID_SCENE,
@@ -41,6 +43,7 @@ render_settings render_settings_default(void)
         .taa = true,
         .singularity = 0.003f,
         .only = ONLY_ALL,
+        .subdivision_max = 3,
         .seed = 1,
         .auto_exposure = true,
         .exposure = 0,
@@ -285,6 +288,12 @@ static const setting_info table[] = {
      .max = 8,
      .value_name = "N",
      .help = "indirect bounces, 1 to 8"},
+    {.name = "many-lights",
+     .type = SETTING_UINT,
+     FIELD(many_lights),
+     .max = 1 << 20,
+     .value_name = "N",
+     .help = "more point lights than this are lit by the hierarchy, as virtual ones are; fewer one by one"},
     {.name = "alpha",
      .type = SETTING_FLOAT,
      FIELD(alpha),
@@ -380,6 +389,12 @@ static const setting_info table[] = {
     {.name = "only", .type = SETTING_ENUM, FIELD(only), .values = only_names, .help = "render one part of the light"},
     {.name = "no-filter", .type = SETTING_FALSE, FIELD(filter), .help = "leave the shadows unfiltered"},
     {.name = "no-taa", .type = SETTING_FALSE, FIELD(taa), .help = "no temporal anti-aliasing of the shadows"},
+    {.name = "subdivision-max",
+     .type = SETTING_UINT,
+     FIELD(subdivision_max),
+     .max = SUBDIVISION_LEVELS_MAX,
+     .value_name = "N",
+     .help = "finest level of subdivided meshes, 0 to 5; coarser ones are taken far away; 0: cages as they are"},
     {.name = "seed",
      .type = SETTING_UINT,
      FIELD(seed),

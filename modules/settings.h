@@ -24,6 +24,7 @@ typedef struct render_settings {
     float ray_budget; // indirect shadow rays per pixel on average, at most shadow_samples; 0: shadow_samples everywhere
     uint32_t vpls; // slots, 0 to 2,500,000
     uint32_t bounces; // indirect bounces, 1 to 8
+    uint32_t many_lights; // more point lights than this join the hierarchy, see renderer_light_slots
     float alpha; // r_l = alpha * h_l; > 0
     uint32_t levels; // 0: automatic
     uint32_t grid; // where the hierarchy's grid lies
@@ -44,6 +45,7 @@ typedef struct render_settings {
     bool taa;
     float singularity; // b as a fraction of the scene's radius: 1 / (d^2 + b^2)
     uint32_t only;
+    uint32_t subdivision_max; // finest level of subdivided meshes, 0 to 5; 0: control cages are drawn as they are
     uint32_t seed;
     bool auto_exposure;
     float exposure; // EV, when not automatic

@@ -1,9 +1,13 @@
 // Virtual point lights at the hits of light paths: makes `vpls`, and counts the rays in `rays_vpl`. The paths' first
 // rays are one batch, and each bounce makes of a batch's hits the next.
 //
+// Behind them, where a scene has many, its point lights as they are: see renderer_light_slots.
+//
 // VPLs stay from frame to frame. A path is traced again when its source changed, or when one of its segments meets the
-// box of a surface that came, went, moved or changed its colour; so the slots of all others are what tracing them again would make, to the
-// bit. (But where two instances' surfaces coincide: there it is the order of traversal that chooses.)
+// box of a surface that came, went, moved, deformed or changed its colour; so the slots of all others are what tracing
+// them again would make, to the bit. (But where two instances' surfaces coincide: there it is the order of traversal
+// that chooses.)
+#include "deform.h"
 #include "modules.h"
 #include "rays.h"
 #include "resource_chain.h"
@@ -21,10 +25,20 @@
 
 enum { BOXES_MAX = 64 }; // the last is around all that do not fit
 
-typedef enum pipeline_name { EMIT, BOUNCE, MARK, LIST, EMIT_SOME, BOUNCE_SOME, PIPELINES } pipeline_name;
+typedef enum pipeline_name {
+    EMIT,
+    BOUNCE,
+    LIGHTS,
+    MARK,
+    LIST,
+    EMIT_SOME,
+    BOUNCE_SOME,
+    LIGHTS_SOME,
+    PIPELINES
+} pipeline_name;
 
 typedef struct trace_key { // what VPLs depend on beside the world
-    uint32_t slots, bounces, seed, rays;
+    uint32_t slots, light_slots, bounces, seed, rays;
     bool is_host;
 } trace_key;
 
@@ -33,7 +47,8 @@ typedef struct vpl_trace {
     vpl_deal deal;
     // Host: shares[paths], sources[groups], elements[], boxes[BOXES_MAX]; see shaders/shared.h.
     gpu_buffer shares, sources, elements, boxes;
-    gpu_buffer vpls; // vpl[slots], the latest
+    gpu_buffer slot_lights; // host: uint[light_slots]
+    gpu_buffer vpls; // vpl[slots + light_slots], the latest
     gpu_buffer starts; // vec3[paths]: where they left their sources
     trace_key key; // of `vpls`
     uint32_t kept_for; // frame at whose beginning `vpls` are those of the frame before; 0: none
@@ -46,9 +61,8 @@ typedef struct vpl_pass {
     vpl_trace *state;
     pipeline_name pipeline;
     uint32_t groups; // workgroups; 0: as many as `vpl_list` says
-    bool is_last;
-    uint32_t frame;
-    uint32_t push[4];
+    uint32_t next_frame; // of the last pass: the VPLs are kept for it; else 0
+    uint32_t push[5];
 } vpl_pass;
 
 // What is handed on from bounce to bounce.
@@ -79,8 +93,8 @@ static void execute(const frame_graph_context *context, void *user)
         gpu_dispatch(context->commands, pass->groups, 1, 1);
     else
         gpu_dispatch_indirect(context->commands, frame_graph_buffer(context, "vpl_list"), 0);
-    if (pass->is_last)
-        pass->state->kept_for = pass->frame + 1;
+    if (pass->next_frame > 0)
+        pass->state->kept_for = pass->next_frame;
 }
 
 static frame_graph_pass *pass_add(renderer *r, const char *name, vpl_pass args)
@@ -96,17 +110,22 @@ static void read_all(frame_graph_pass *pass, const char *const *names, size_t co
         frame_graph_read(pass, names[i], ACCESS_STORAGE_READ);
 }
 
+static uint32_t slots_of(const vpl_trace *state)
+{
+    return state->key.slots + state->key.light_slots;
+}
+
 // Lists the paths that have to be traced again.
 static void list_declare(renderer *r, vpl_trace *state, vpl_chains *chains)
 {
     static const char *const inputs[] = {"vpl_shares", "vpl_sources", "vpl_boxes", "vpl_starts_kept", "vpls_1"};
     const uint32_t groups = div_up_u32(chains->paths, 64);
-    frame_graph_pass *mark =
-        pass_add(r, "vpl_trace/mark",
-                 (vpl_pass){.state = state,
-                            .pipeline = MARK,
-                            .groups = groups,
-                            .push = {state->key.slots, state->key.bounces, chains->paths, state->box_count}});
+    frame_graph_pass *mark = pass_add(
+        r, "vpl_trace/mark",
+        (vpl_pass){.state = state,
+                   .pipeline = MARK,
+                   .groups = groups,
+                   .push = {state->key.slots, state->key.bounces, chains->paths, state->box_count, slots_of(state)}});
     read_all(mark, inputs, countof(inputs));
     const frame_graph_resource_desc mask = frame_graph_buffer_of(groups * 2ull * sizeof(uint32_t));
     frame_graph_create_resource(mark, "vpl_mask", &mask, ACCESS_STORAGE_WRITE);
@@ -140,6 +159,7 @@ static void emit_declare(renderer *r, vpl_trace *state, vpl_chains *chains)
 
 static void bounce_declare(renderer *r, vpl_trace *state, vpl_chains *chains, uint32_t bounce, bool last)
 {
+    const uint32_t next_frame = last && state->key.light_slots == 0 ? r->frame + 1 : 0;
     const bool some = state->change == VPLS_SOME;
     char name[48], hits[48];
     snprintf(name, sizeof name, "%s/bounce", batch_of(bounce).text);
@@ -147,8 +167,7 @@ static void bounce_declare(renderer *r, vpl_trace *state, vpl_chains *chains, ui
     const vpl_pass args = {.state = state,
                            .pipeline = some ? BOUNCE_SOME : BOUNCE,
                            .groups = some ? 0 : div_up_u32(chains->rays, 64),
-                           .is_last = last,
-                           .frame = r->frame,
+                           .next_frame = next_frame,
                            .push = {state->key.slots, state->key.bounces, bounce, last}};
     frame_graph_pass *pass = pass_add(r, name, args);
     resource_chain_next(&chains->counter, pass);
@@ -162,6 +181,24 @@ static void bounce_declare(renderer *r, vpl_trace *state, vpl_chains *chains, ui
         resource_chain_next(&chains->changed, pass);
         frame_graph_read(pass, "vpl_list", ACCESS_INDIRECT);
     }
+    deform_read(pass);
+}
+
+// The point lights that join the hierarchy, in the slots behind.
+static void lights_declare(renderer *r, vpl_trace *state, vpl_chains *chains)
+{
+    const bool some = state->change == VPLS_SOME;
+    frame_graph_pass *pass = pass_add(r, "vpl_trace/lights",
+                                      (vpl_pass){.state = state,
+                                                 .pipeline = some ? LIGHTS_SOME : LIGHTS,
+                                                 .groups = div_up_u32(state->key.light_slots, 64),
+                                                 .next_frame = r->frame + 1,
+                                                 .push = {state->key.slots, state->key.light_slots}});
+    resource_chain_next(&chains->vpls, pass);
+    frame_graph_import_buffer(r->graph, "vpl_slot_lights", state->slot_lights, ACCESS_HOST_WRITE, ACCESS_NONE);
+    frame_graph_read(pass, "vpl_slot_lights", ACCESS_STORAGE_READ);
+    if (some)
+        resource_chain_next(&chains->changed, pass);
 }
 
 static void buffers_import(renderer *r, const vpl_trace *state)
@@ -186,13 +223,15 @@ static void trace_declare(renderer *r, vpl_trace *state)
 {
     const uint32_t slots = state->key.slots, bounces = min_u32(state->key.bounces, slots);
     const uint32_t rays = div_up_u32(slots, state->key.bounces);
+    const uint32_t makers = 1 + bounces + (state->key.light_slots > 0);
     vpl_chains chains = {
         .paths = state->deal.path_count,
         .rays = rays,
         .counter = resource_chain_counter(r->graph, "vpl_trace/clear", "rays_vpl", 1 + bounces),
         .flux = {"vpl_flux", frame_graph_buffer_of(rays * 3ull * sizeof(float)), 1 + bounces, 0},
-        .vpls = {.name = "vpls", .length = 1 + bounces, .done = 1}, // the first is the import
-        .changed = {"vpl_changed", frame_graph_buffer_of(div_up_u32(slots, 32) * sizeof(uint32_t)), 1 + bounces, 0},
+        .vpls = {.name = "vpls", .length = makers, .done = 1}, // the first is the import
+        .changed = {"vpl_changed", frame_graph_buffer_of(div_up_u32(slots_of(state), 32) * sizeof(uint32_t)), makers,
+                    0},
     };
     buffers_import(r, state);
     if (state->change == VPLS_SOME)
@@ -202,6 +241,8 @@ static void trace_declare(renderer *r, vpl_trace *state)
         rays_trace(r, batch_of(bounce).text, RAYS_NEAREST, rays);
         bounce_declare(r, state, &chains, bounce, bounce + 1 == bounces);
     }
+    if (state->key.light_slots > 0)
+        lights_declare(r, state, &chains);
 }
 
 // ---- What the passes read
@@ -342,6 +383,17 @@ static bool boxes_write(renderer *r, vpl_trace *state)
     return true;
 }
 
+static bool slot_lights_write(renderer *r, vpl_trace *state)
+{
+    const light_slots *slots = &r->gpu_world->light_slots;
+    const size_t size = renderer_light_slots(r) * sizeof *slots->lights;
+    uint32_t *lights =
+        world_buffer_reserve(r, &state->slot_lights, "slot lights", BINDING_NONE, size > 0 ? size : sizeof *lights);
+    if (lights && size > 0)
+        memcpy(lights, slots->lights, size);
+    return lights != NULL;
+}
+
 // Room for VPLs; others than before are undefined.
 static bool vpls_reserve(renderer *r, vpl_trace *state, uint32_t slots, uint32_t paths)
 {
@@ -369,8 +421,8 @@ static bool vpls_reserve(renderer *r, vpl_trace *state, uint32_t slots, uint32_t
 
 static bool keys_equal(const trace_key *a, const trace_key *b)
 {
-    return a->slots == b->slots && a->bounces == b->bounces && a->seed == b->seed && a->rays == b->rays &&
-           a->is_host == b->is_host;
+    return a->slots == b->slots && a->light_slots == b->light_slots && a->bounces == b->bounces && a->seed == b->seed &&
+           a->rays == b->rays && a->is_host == b->is_host;
 }
 
 // The offsets of rays and the rectangles that suns shine through follow the bounds. Where most paths changed, listing
@@ -406,10 +458,11 @@ static void vpl_trace_setup(renderer *r, void *user)
     state->change = VPLS_ALL;
     if (!renderer_has_vpls(r) || vpl_reference_has_vpls(r))
         return;
-    const trace_key key = {renderer_vpl_slots(r), r->settings.bounces, r->settings.seed, r->settings.rays,
-                           rays_are_host(r)};
+    const trace_key key = {renderer_vpl_slots(r), renderer_light_slots(r), r->settings.bounces,
+                           r->settings.seed,      r->settings.rays,        rays_are_host(r)};
     const uint32_t paths = max_u32(1, key.slots / key.bounces);
-    if (!deal_follow(r, state, paths) || !boxes_write(r, state) || !vpls_reserve(r, state, key.slots, paths)) {
+    if (!deal_follow(r, state, paths) || !boxes_write(r, state) || !slot_lights_write(r, state) ||
+        !vpls_reserve(r, state, key.slots + key.light_slots, paths)) {
         r->failed = true;
         return;
     }
@@ -430,8 +483,8 @@ static void vpl_trace_fini(renderer *r, void *user)
     vpl_trace *state = user;
     for (uint32_t i = 0; i < PIPELINES; i++)
         gpu_pipeline_destroy(r->gpu, state->pipelines[i]);
-    const gpu_buffer buffers[] = {state->shares, state->sources, state->elements,
-                                  state->boxes,  state->vpls,    state->starts};
+    const gpu_buffer buffers[] = {state->shares,      state->sources, state->elements, state->boxes,
+                                  state->slot_lights, state->vpls,    state->starts};
     for (size_t i = 0; i < countof(buffers); i++)
         gpu_buffer_destroy(r->gpu, buffers[i]);
     vpl_deal_fini(&state->deal);
@@ -440,9 +493,14 @@ static void vpl_trace_fini(renderer *r, void *user)
 bool vpl_trace_init(renderer *r)
 {
     static const gpu_shader *const shaders[PIPELINES] = {
-        [EMIT] = &shader_vpl_trace_emit_comp,           [BOUNCE] = &shader_vpl_trace_bounce_comp,
-        [MARK] = &shader_vpl_trace_mark_comp,           [LIST] = &shader_vpl_trace_list_comp,
-        [EMIT_SOME] = &shader_vpl_trace_emit_some_comp, [BOUNCE_SOME] = &shader_vpl_trace_bounce_some_comp,
+        [EMIT] = &shader_vpl_trace_emit_comp,
+        [BOUNCE] = &shader_vpl_trace_bounce_comp,
+        [LIGHTS] = &shader_vpl_trace_lights_comp,
+        [MARK] = &shader_vpl_trace_mark_comp,
+        [LIST] = &shader_vpl_trace_list_comp,
+        [EMIT_SOME] = &shader_vpl_trace_emit_some_comp,
+        [BOUNCE_SOME] = &shader_vpl_trace_bounce_some_comp,
+        [LIGHTS_SOME] = &shader_vpl_trace_lights_some_comp,
     };
     vpl_trace *state = renderer_pass_add(r, "vpl_trace", sizeof(vpl_trace), vpl_trace_setup, vpl_trace_fini);
     for (uint32_t i = 0; i < PIPELINES; i++) {

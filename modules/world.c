@@ -114,7 +114,7 @@ entity world_sun_add(renderer *r, const float direction[3], float lux)
 
 // ---- Transforms
 
-static void matrix_multiply(const float a[16], const float b[16], float product[16])
+void world_matrix_multiply(const float a[16], const float b[16], float product[16])
 {
     mat4 left, right; // over-aligned, so copies
     memcpy(left, a, sizeof left);
@@ -142,7 +142,7 @@ static void transform_update(renderer *r, entity e)
     }
     memcpy(transform->previous_world, transform->world, sizeof transform->world);
     if (parent)
-        matrix_multiply(parent->world, node->matrix, transform->world);
+        world_matrix_multiply(parent->world, node->matrix, transform->world);
     else
         memcpy(transform->world, node->matrix, sizeof transform->world);
     if (is_new)
@@ -154,6 +154,7 @@ static void transforms_update(ecs_world *world, void *user)
     renderer *r = user;
     for (ecs_iterator it = ecs_iterate(world, r->gpu_world->node); ecs_next(&it);)
         transform_update(r, it.entity);
+    world_deform_update(r);
 }
 
 // ---- The order of instances
@@ -219,12 +220,32 @@ static void box_add_transformed(box *b, const box *from, const float matrix[16])
 
 static const box box_empty = {{FLT_MAX, FLT_MAX, FLT_MAX}, {-FLT_MAX, -FLT_MAX, -FLT_MAX}};
 
+// From the instance's mesh to the world.
+typedef struct placement {
+    const float *world, *previous_world;
+} placement;
+
+bool world_is_skinned(const renderer *r, uint32_t mesh)
+{
+    const uint32_t index = r->gpu_world->mesh_deformations[mesh];
+    return index != SCENE_NONE && r->scene->deformations[index].skin != SCENE_NONE;
+}
+
+static placement placement_of(const renderer *r, const world_instance *instance)
+{
+    static const float identity[16] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
+    if (world_is_skinned(r, instance->mesh))
+        return (placement){identity, identity};
+    const transform_component *transform = ecs_get(r->world, instance->entity, r->gpu_world->transform);
+    return (placement){transform->world, transform->previous_world};
+}
+
 static void box_add_instance(const renderer *r, box *b, const world_instance *instance)
 {
-    const transform_component *transform = ecs_get(r->world, instance->entity, r->gpu_world->transform);
+    const float *world = placement_of(r, instance).world;
     const scene_mesh *mesh = &r->scene->meshes[instance->mesh];
     for (uint32_t i = 0; i < mesh->primitive_count; i++)
-        box_add_transformed(b, &r->gpu_world->primitive_boxes[mesh->first_primitive + i], transform->world);
+        box_add_transformed(b, &r->gpu_world->primitive_boxes[mesh->first_primitive + i], world);
 }
 
 static void instances_order(renderer *r)
@@ -265,7 +286,7 @@ static bool instances_find(renderer *r)
         const uint32_t mesh = ((mesh_component *)it.component)->mesh;
         assert(mesh < w->blas_count);
         const transform_component *transform = ecs_get(r->world, it.entity, w->transform);
-        if (w->blas[mesh].id && transform && matrix_is_invertible(transform->world))
+        if (w->blas[mesh].id && transform && (world_is_skinned(r, mesh) || matrix_is_invertible(transform->world)))
             state->found[count++] = (world_instance){it.entity, mesh};
     }
     const size_t size = count * sizeof *state->found;
@@ -303,15 +324,32 @@ static bool normal_matrix_of(const float world[3][4], float normal[3][4])
     return mirrored;
 }
 
+// What its winding makes of the front becomes its back.
+static void instance_turn(mesh_instance_gpu *instance)
+{
+    instance->mirrored = !instance->mirrored;
+    for (int row = 0; row < 3; row++)
+        glm_vec3_negate(instance->normal_matrix[row]);
+}
+
 static mesh_instance_gpu instance_make(const renderer *r, const world_instance *from)
 {
-    const transform_component *transform = ecs_get(r->world, from->entity, r->gpu_world->transform);
+    const placement placed = placement_of(r, from);
     const scene_mesh *mesh = &r->scene->meshes[from->mesh];
     mesh_instance_gpu instance = {
-        .first_primitive = mesh->first_primitive, .primitive_count = mesh->primitive_count, .mesh = from->mesh};
-    rows_of(transform->world, instance.world);
-    rows_of(transform->previous_world, instance.previous_world);
+        .first_primitive = mesh->first_primitive,
+        .primitive_count = mesh->primitive_count,
+        .mesh = from->mesh,
+        .previous_vertex = PREVIOUS_SAME,
+    };
+    rows_of(placed.world, instance.world);
+    rows_of(placed.previous_world, instance.previous_world);
     instance.mirrored = normal_matrix_of(instance.world, instance.normal_matrix);
+    const world_deformation *deformation = world_deformation_of(r, from->mesh);
+    if (deformation && deformation->changed)
+        instance.previous_vertex = deformation->first_kept;
+    if (deformation && deformation->mirrored)
+        instance_turn(&instance);
     return instance;
 }
 
@@ -330,9 +368,11 @@ static void tlas_instances_write(renderer *r, VkAccelerationStructureInstanceKHR
     }
 }
 
+// Or deformed.
 static bool instance_moved(const mesh_instance_gpu *instance)
 {
-    return memcmp(instance->world, instance->previous_world, sizeof instance->world) != 0;
+    return memcmp(instance->world, instance->previous_world, sizeof instance->world) != 0 ||
+           instance->previous_vertex != PREVIOUS_SAME;
 }
 
 // Fills this frame's instances in; `emitter_moved` is set when one with an emissive material moved. False: no memory.
@@ -421,11 +461,14 @@ static void boxes_move(renderer *r)
     for (uint32_t i = 0; i < w->instance_count; i++) {
         if (!instance_moved(&w->instance_data[i]))
             continue;
-        const transform_component *transform = ecs_get(r->world, w->order[i].entity, w->transform);
+        const float *previous_world = placement_of(r, &w->order[i]).previous_world;
+        const world_deformation *deformation = world_deformation_of(r, w->order[i].mesh);
         const scene_mesh *mesh = &r->scene->meshes[w->order[i].mesh];
         box before = box_empty;
         for (uint32_t k = 0; k < mesh->primitive_count; k++)
-            box_add_transformed(&before, &w->primitive_boxes[mesh->first_primitive + k], transform->previous_world);
+            box_add_transformed(
+                &before, deformation ? &deformation->previous_box : &w->primitive_boxes[mesh->first_primitive + k],
+                previous_world);
         changed_add(w, &before);
         w->state->boxes[i].box = instance_box(r, &w->order[i]);
         changed_add(w, &w->state->boxes[i].box);
@@ -501,6 +544,7 @@ static void world_extract(ecs_world *world, void *user)
     const bool listed = instances_find(r);
     if (listed)
         instances_order(r);
+    world_deform_mark(r);
     const bool emission_changed = world_materials_changes(r) & MATERIAL_EMISSION_CHANGED;
     if (emission_changed)
         meshes_find_emitters(r);
@@ -509,6 +553,7 @@ static void world_extract(ecs_world *world, void *user)
     if (r->failed)
         return;
     boxes_extract(r, listed, last_count);
+    r->gpu_world->changes.instances = listed || r->gpu_world->changes.box_count > 0;
     bounds_extract(r);
     r->failed |= !world_lights_extract(r, emitter_moved);
     world_materials_rest(r);
@@ -547,7 +592,7 @@ bool world_init(renderer *r)
     ecs_system_register(r->world, &transforms);
     const ecs_system_desc extract = {.name = "extract", .phase = ECS_PHASE_EXTRACT, .run = world_extract, .user = r};
     ecs_system_register(r->world, &extract);
-    return world_upload(r) && world_lights_init(r) &&
+    return world_upload(r) && world_deform_init(r) && world_lights_init(r) &&
            world_buffer_reserve(r, &w->frame, "frame constants", SCENE_FRAME, sizeof(frame_constants));
 }
 
@@ -558,6 +603,7 @@ void world_fini(renderer *r)
         return;
     world_lights_fini(r);
     world_materials_fini(r);
+    world_deform_fini(r);
     const gpu_buffer buffers[] = {w->frame,      w->positions, w->attributes,    w->indices,
                                   w->primitives, w->instances, w->materials,     w->lights,
                                   w->emitters,   w->light_cdf, w->tlas_instances};

@@ -2,6 +2,7 @@
 // geometry, materials and textures once, and extracts instances, lights and frame constants every frame.
 #pragma once
 
+#include "light_slots.h"
 #include "renderer.h"
 
 // Components. An engine adds, changes and removes them while running; the next frame follows.
@@ -44,13 +45,29 @@ typedef struct world_source {
     float power; // as world_element_power, their sum
 } world_source;
 
-// What is not as it was in the last frame; all of it in the first. Geometry and textures never change, nor does of
-// materials anything but their colours.
+// A mesh that deforms, in this frame. What follows its vertices (the pass "deform", acceleration structures, Embree)
+// keeps the version that it has followed to.
+typedef struct world_deformation {
+    uint32_t version; // changes of its vertices so far; 0: they are at rest
+    bool changed; // the vertices are others than in the last frame
+    bool drawn; // an instance of this frame has the mesh; of a level that has none, vertices and trees stay behind
+    bool mirrored; // turned inside out: most of its joints' determinants are negative
+    float scale; // mean of its joints': what they make of a length of 1
+    bool stretched; // so far from rest that a tree over the triangles at rest is worth no keeping
+    box box, previous_box; // mesh space, around all its vertices, in this frame and the last
+    uint32_t first_kept; // number of its first vertex among those of all deformations
+    const float (*joints)[3][4]; // [skin's joint_count]: rows, from the mesh at rest to the world
+    const float *weights; // [target_count]
+} world_deformation;
+
+// What is not as it was in the last frame; all of it in the first. Textures never change, nor do materials but for
+// their colours, nor does geometry but by deformations.
 typedef struct world_changes {
+    bool instances; // one moved, deformed, or is listed at another place
     bool bounds; // the constants' scene_min, scene_max and scene_radius
     bool sources; // one changed, came, went or was numbered anew
-    // World: what the instances that moved, came or went cover, and what they covered; and what the primitives cover
-    // whose base colour changed. Emission is a matter of the sources.
+    // World: what the instances that moved, deformed, came or went cover, and what they covered; and what the
+    // primitives cover whose base colour changed. Emission is a matter of the sources.
     const box *boxes;
     uint32_t box_count;
 } world_changes;
@@ -68,7 +85,7 @@ typedef struct world_gpu {
     // Where the device is a CPU, `positions` and `indices` are mapped, for Embree.
     gpu_buffer frame, positions, attributes, indices, primitives, instances, materials, lights, emitters, light_cdf;
     gpu_buffer tlas_instances; // VkAccelerationStructureInstanceKHR[instance_count], host
-    gpu_acceleration *blas; // per mesh; {0} for meshes without triangles
+    gpu_acceleration *blas; // per mesh, at rest at first; {0} for meshes without triangles
     uint32_t blas_count;
     gpu_image *textures; // one per image and colour space
     uint32_t texture_count;
@@ -77,13 +94,22 @@ typedef struct world_gpu {
     const world_source *sources; // this frame's, by kind and entity
     uint32_t source_count;
     world_changes changes; // of this frame
+    // Lights from this one on, all of them point lights, join the lighting grid hierarchy, and direct_light leaves them
+    // out; the number of punctual lights where none does. Their slots hold their indices.
+    uint32_t first_joined;
+    light_slots light_slots;
     float light_power; // of all sources: luminous flux in lumen-like units (watts of luminance); 0: no light at all
 
     // What the CPU knows of the scene. Instances are ordered by recursive median split over their centres, for drivers
     // that build BVHs by halving the list as given; the order changes only when meshes come or go.
-    box *primitive_boxes; // mesh space, per primitive
+    box *primitive_boxes; // mesh space, per primitive; of deforming meshes the whole mesh's
     world_instance *order; // instance_count, in the order of the TLAS
     mesh_instance_gpu *instance_data; // the same order
+    world_deformation *deformations; // parallel to the scene's
+    uint32_t *mesh_deformations; // per mesh: index, or SCENE_NONE
+    uint32_t kept_vertices; // of all deformations
+    gpu_buffer previous_positions; // vec3[kept_vertices]: of last frame, where `changed`
+    struct deformation_state *deformation_states; // private to world_deform.c
     struct world_state *state; // private to world.c
     struct world_materials *material_state; // private to world_materials.c
     struct world_lights *light_state; // private to world_lights.c
@@ -102,6 +128,18 @@ void world_material_set(renderer *r, uint32_t index, const float base_color[4], 
 // Luminous flux of a light source's element, as `light_power`.
 float world_element_power(const renderer *r, uint32_t element);
 
+// The mesh's deformation in this frame; NULL: it has none.
+const world_deformation *world_deformation_of(const renderer *r, uint32_t mesh);
+// Where this frame's joints and targets put a vertex of the scene that is the deformation's, mesh space: what the GPU
+// computes, but for rounding.
+void world_deformed_position(const renderer *r, uint32_t deformation, uint32_t vertex, float position[3]);
+// A skinned mesh stays where its joints put it: its node does not move it (glTF 2.0, section 3.7.3.3).
+bool world_is_skinned(const renderer *r, uint32_t mesh);
+// Triangles of a mesh, a geometry a primitive, for acceleration structures over `positions`, those of the scene's
+// vertex 0, `stride` bytes apart. `geometries` has room for its primitives.
+void world_mesh_triangles(const renderer *r, uint32_t mesh, VkDeviceAddress positions, uint32_t stride,
+                          gpu_triangles *geometries);
+
 // ---- Between the world's files.
 bool world_upload(renderer *r); // world_upload.c: what never changes, and materials at first
 // world_materials.c: before all else; at the start and at the end of each extraction.
@@ -112,8 +150,16 @@ void world_materials_rest(renderer *r);
 void world_materials_fini(renderer *r);
 uint8_t world_material_changes(const renderer *r, uint32_t index); // MATERIAL_*_CHANGED, since the last frame
 uint8_t world_materials_changes(const renderer *r); // of any of them
+void world_matrix_multiply(const float a[16], const float b[16], float product[16]); // `product` may be either
+// world_deform.c: after the upload; after the transforms; once the instances are ordered; the last accepts a world half
+// made.
+bool world_deform_init(renderer *r);
+void world_deform_update(renderer *r);
+void world_deform_mark(renderer *r); // which deformations are drawn
+void world_deform_fini(renderer *r);
 // world_lights.c: punctual lights, emissive triangles and the choice among them. Emitters are gathered anew when
-// `moved`, that is when an instance with an emissive material moved, any instance came or went, or emission changed.
+// `moved`, that is when an instance with an emissive material moved or deformed, any instance came or went, or emission
+// changed.
 bool world_lights_init(renderer *r);
 bool world_lights_extract(renderer *r, bool moved);
 void world_lights_fini(renderer *r);

@@ -10,6 +10,8 @@
 #define CGLM_FORCE_DEPTH_ZERO_TO_ONE
 #include <cglm/cglm.h>
 
+enum { JOINED_MAX = 1 << 20 }; // lights; behind 2,500,000 VPLs their slots' numbers still have 22 bits
+
 typedef struct punctual_list {
     punctual_light *lights;
     float *powers; // of the lights
@@ -130,13 +132,27 @@ static void point_to_world(const mesh_instance_gpu *instance, const float p[3], 
     }
 }
 
+// Mesh space, in this frame.
+static void vertex_position(const renderer *r, uint32_t mesh, uint32_t vertex, float position[3])
+{
+    const uint32_t deformation = r->gpu_world->mesh_deformations[mesh];
+    if (deformation == SCENE_NONE)
+        memcpy(position, r->scene->positions[vertex], 3 * sizeof(float));
+    else
+        world_deformed_position(r, deformation, vertex, position);
+}
+
 // Everything but the emission and the probability. False for a triangle without area.
-static bool emitter_place(const scene_data *s, const mesh_instance_gpu *instance, const mesh_primitive *p,
+static bool emitter_place(const renderer *r, const mesh_instance_gpu *instance, const mesh_primitive *p,
                           const uint32_t vertices[3], emissive_triangle *emitter)
 {
+    const scene_data *s = r->scene;
     float corners[3][3], cross[3];
-    for (int k = 0; k < 3; k++)
-        point_to_world(instance, s->positions[vertices[k]], corners[k]);
+    for (int k = 0; k < 3; k++) {
+        float position[3];
+        vertex_position(r, instance->mesh, vertices[k], position);
+        point_to_world(instance, position, corners[k]);
+    }
     memcpy(emitter->corner, corners[0], sizeof emitter->corner);
     glm_vec3_sub(corners[1], corners[0], emitter->edge1);
     glm_vec3_sub(corners[2], corners[0], emitter->edge2);
@@ -176,7 +192,7 @@ static uint32_t emitters_append(const renderer *r, uint32_t index, uint32_t geom
         memcpy(emitter.emission, emissive, sizeof emitter.emission);
         if (means)
             glm_vec3_mul(means[t], emitter.emission, emitter.emission);
-        if (!(luminance(emitter.emission) > 0) || !emitter_place(s, instance, p, vertices, &emitter))
+        if (!(luminance(emitter.emission) > 0) || !emitter_place(r, instance, p, vertices, &emitter))
             continue;
         powers[count] = GLM_PIf * luminance(emitter.emission) * emitter.area * (emitter.two_sided ? 2 : 1);
         emitters[count++] = emitter;
@@ -265,7 +281,36 @@ static float light_power(const frame_constants *c, const light_component *light,
     return 0;
 }
 
-// Gathers the lights, each with a source of its own at the start of this frame's sources.
+// Settings under which point lights may join the hierarchy. Of one part of the light alone (--only) they do not, so
+// that direct light stays direct, nor for the references, which need no approximation.
+static bool lights_may_join(const renderer *r)
+{
+    return r->settings.method == METHOD_LGH && r->settings.only == ONLY_ALL && r->settings.vpls > 0;
+}
+
+static bool point_lights_join(const renderer *r)
+{
+    const world_gpu *w = r->gpu_world;
+    uint32_t count = 0;
+    for (ecs_iterator it = ecs_iterate(r->world, w->light); ecs_next(&it);)
+        count += ((light_component *)it.component)->type == LIGHT_POINT && ecs_get(r->world, it.entity, w->transform);
+    return lights_may_join(r) && count > r->settings.many_lights && count <= JOINED_MAX;
+}
+
+static void light_append(renderer *r, entity e, const light_component *light)
+{
+    const transform_component *transform = ecs_get(r->world, e, r->gpu_world->transform);
+    if (!transform)
+        return;
+    struct world_lights *state = r->gpu_world->light_state;
+    punctual_list *list = &state->punctual;
+    const uint32_t i = state->sources.count++;
+    list->lights[i] = light_make(light, transform->world);
+    list->powers[i] = light_power(&r->constants, light, &list->lights[i]);
+    state->sources.sources[i] = (world_source){.entity = e, .first = i, .count = 1, .power = list->powers[i]};
+}
+
+// Gathers the lights, each with a source of its own at the start of this frame's sources; those that join last.
 static bool lights_gather(renderer *r)
 {
     world_gpu *w = r->gpu_world;
@@ -281,21 +326,19 @@ static bool lights_gather(renderer *r)
     punctual_light *mapped = world_buffer_reserve(r, &w->lights, "lights", SCENE_LIGHTS, limit * sizeof *mapped);
     if (!mapped)
         return false;
-    uint32_t count = 0;
-    for (ecs_iterator it = ecs_iterate(r->world, w->light); ecs_next(&it);) {
-        const light_component *light = it.component;
-        const transform_component *transform = ecs_get(r->world, it.entity, w->transform);
-        if (!transform)
-            continue;
-        list->lights[count] = light_make(light, transform->world);
-        list->powers[count] = light_power(&r->constants, light, &list->lights[count]);
-        state->sources.sources[count] =
-            (world_source){.entity = it.entity, .first = count, .count = 1, .power = list->powers[count]};
-        count++;
+    state->sources.count = 0;
+    const bool join = point_lights_join(r);
+    for (int joined = 0; joined < 2; joined++) {
+        for (ecs_iterator it = ecs_iterate(r->world, w->light); ecs_next(&it);) {
+            const light_component *light = it.component;
+            if ((join && light->type == LIGHT_POINT) == joined)
+                light_append(r, it.entity, light);
+        }
+        w->first_joined = joined ? w->first_joined : state->sources.count;
     }
+    const uint32_t count = r->constants.light_count = state->sources.count;
     if (count > 0)
         memcpy(mapped, list->lights, count * sizeof *mapped);
-    r->constants.light_count = state->sources.count = count;
     return true;
 }
 
@@ -403,6 +446,20 @@ static bool distribution_write(renderer *r)
     return true;
 }
 
+// The punctual lights come first among the sorted sources.
+static void slots_assign(renderer *r)
+{
+    world_gpu *w = r->gpu_world;
+    const source_list *list = &w->light_state->sources;
+    light_slots_light *joined = memory_alloc(max_u32(r->constants.light_count, 1) * sizeof *joined);
+    uint32_t count = 0;
+    for (uint32_t i = 0; i < r->constants.light_count; i++)
+        if (list->sources[i].first >= w->first_joined)
+            joined[count++] = (light_slots_light){list->sources[i].entity.id, list->sources[i].first};
+    light_slots_update(&w->light_slots, joined, count);
+    free(joined);
+}
+
 bool world_lights_extract(renderer *r, bool moved)
 {
     world_gpu *w = r->gpu_world;
@@ -415,6 +472,7 @@ bool world_lights_extract(renderer *r, bool moved)
         return false;
     emissive_sources_append(r);
     qsort(state->sources.sources, state->sources.count, sizeof(world_source), source_compare);
+    slots_assign(r);
     w->changes.sources = sources_compare(r, last_lights, moved);
     w->sources = state->sources.sources;
     w->source_count = state->sources.count;
@@ -452,5 +510,6 @@ void world_lights_fini(renderer *r)
     }
     free(state->sources.sources);
     free(state->last_sources.sources);
+    light_slots_fini(&r->gpu_world->light_slots);
     free(state);
 }

@@ -1,5 +1,5 @@
-// What of the scene never changes, on the GPU: geometry, textures and bottom-level acceleration structures; and
-// materials as they are at first.
+// What of the scene never changes, on the GPU, or is deformed there: geometry, textures and bottom-level acceleration
+// structures; and materials as they are at first.
 #include "world.h"
 
 #include <float.h>
@@ -159,29 +159,39 @@ static box primitive_box(const scene_data *s, const mesh_primitive *p)
     return b;
 }
 
-// One geometry a primitive, so that a ray's geometry index counts primitives. {0} and true for a mesh without
-// triangles.
-static bool blas_build(renderer *r, const scene_mesh *mesh, gpu_acceleration *blas)
+void world_mesh_triangles(const renderer *r, uint32_t index, VkDeviceAddress positions, uint32_t stride,
+                          gpu_triangles *geometries)
 {
     const scene_data *s = r->scene;
-    const VkDeviceAddress positions = gpu_buffer_address(r->gpu, r->gpu_world->positions);
+    const scene_mesh *mesh = &s->meshes[index];
     const VkDeviceAddress indices = gpu_buffer_address(r->gpu, r->gpu_world->indices);
-    gpu_triangles *geometries = memory_alloc(max_u32(mesh->primitive_count, 1) * sizeof *geometries);
-    uint64_t triangles = 0;
     for (uint32_t i = 0; i < mesh->primitive_count; i++) {
         const mesh_primitive *p = &s->primitives[mesh->first_primitive + i];
         geometries[i] = (gpu_triangles){
-            .positions = positions + p->first_vertex * sizeof *s->positions,
-            .position_stride = sizeof *s->positions,
+            .positions = positions + (VkDeviceAddress)p->first_vertex * stride,
+            .position_stride = stride,
             .position_count = p->vertex_count,
             .indices = indices + p->first_index * sizeof *s->indices,
             .triangle_count = p->index_count / 3,
             .opaque = !(s->materials[p->material].flags & MATERIAL_ALPHA_MASK),
         };
-        triangles += geometries[i].triangle_count;
     }
+}
+
+// One geometry a primitive, so that a ray's geometry index counts primitives. {0} and true for a mesh without
+// triangles.
+static bool blas_build(renderer *r, uint32_t index, bool deforms, gpu_acceleration *blas)
+{
+    const scene_data *s = r->scene;
+    const uint32_t count = s->meshes[index].primitive_count;
+    gpu_triangles *geometries = memory_alloc(max_u32(count, 1) * sizeof *geometries);
+    world_mesh_triangles(r, index, gpu_buffer_address(r->gpu, r->gpu_world->positions), sizeof *s->positions,
+                         geometries);
+    uint64_t triangles = 0;
+    for (uint32_t i = 0; i < count; i++)
+        triangles += geometries[i].triangle_count;
     if (triangles > 0)
-        *blas = gpu_blas_create(r->gpu, geometries, mesh->primitive_count);
+        *blas = gpu_blas_create(r->gpu, geometries, count, deforms);
     free(geometries);
     return triangles == 0 || blas->id;
 }
@@ -195,10 +205,14 @@ static bool meshes_upload(renderer *r)
         w->primitive_boxes[i] = primitive_box(s, &s->primitives[i]);
     w->blas = memory_alloc(max_u32(s->mesh_count, 1) * sizeof *w->blas);
     w->blas_count = s->mesh_count;
-    for (uint32_t i = 0; i < s->mesh_count; i++)
-        if (!blas_build(r, &s->meshes[i], &w->blas[i]))
-            return false;
-    return true;
+    bool *deforms = memory_alloc(max_u32(s->mesh_count, 1) * sizeof *deforms);
+    for (uint32_t i = 0; i < s->deformation_count; i++)
+        deforms[s->deformations[i].mesh] = true;
+    bool built = true;
+    for (uint32_t i = 0; i < s->mesh_count && built; i++)
+        built = blas_build(r, i, deforms[i], &w->blas[i]);
+    free(deforms);
+    return built;
 }
 
 bool world_upload(renderer *r)

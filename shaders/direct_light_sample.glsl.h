@@ -22,7 +22,7 @@ layout(push_constant, scalar) uniform push_block {
     uint first, layers; // of this batch
     uint samples;       // of each kind, 1 to DIRECT_SAMPLES_MAX
     uint candidates;    // of each sample of the emissive triangles
-    uint punctual;      // 1: the punctual lights are sampled here
+    uint punctual;      // punctual lights that are sampled here, the first ones; 0: none is
 } push;
 
 struct direct_estimate {
@@ -48,7 +48,7 @@ void sample_punctual(uvec2 pixel, gbuffer_point point, vec3 origin, uint key, in
     uint chosen[DIRECT_SAMPLES_MAX];
     uint end = min(push.first + push.layers, push.samples);
     float total = 0.0;
-    for (uint i = 0u; i < frame.light_count; i++) {
+    for (uint i = 0u; i < push.punctual; i++) {
         vec3 light = punctual_arrival(lights[i], point).light;
         float weight = luminance(light);
         if (weight <= 0.0)
@@ -107,7 +107,7 @@ emitter_choice emitter_choose(gbuffer_point point, uint key, float share)
 void sample_emitters(uvec2 pixel, gbuffer_point point, vec3 origin, uint key, inout direct_estimate estimate)
 {
     float share = emitter_share();
-    uint before = push.punctual * push.samples;
+    uint before = push.punctual > 0u ? push.samples : 0u;
     for (uint layer = max(push.first, before); layer < push.first + push.layers; layer++) {
         uint ray = ray_of_layer(pixel, layer);
         emitter_choice choice = emitter_choose(point, hash(key, layer - before), share);
@@ -129,7 +129,7 @@ void make_rays(uvec2 pixel, gbuffer_point point, inout direct_estimate estimate)
 {
     vec3 origin = offset_origin(point.position, point.geometric, frame.scene_radius);
     uint key = hash(pixel.x | pixel.y << 16, frame.frame, frame.seed);
-    if (push.first < push.punctual * push.samples)
+    if (push.punctual > 0u && push.first < push.samples)
         sample_punctual(pixel, point, origin, hash(key, 1u), estimate);
     if (frame.emitter_count > 0u)
         sample_emitters(pixel, point, origin, hash(key, 2u), estimate);

@@ -21,6 +21,13 @@ vec3 relative_position(vec4 rows[3], vec3 p, vec3 eye)
     return rows_rotate(rows, p) + (vec3(rows[0].w, rows[1].w, rows[2].w) - eye);
 }
 
+// Where the vertex was in the last frame, mesh space.
+vec3 previous_position(uint vertex)
+{
+    mesh_instance_gpu instance = instances[draw.instance];
+    return previous_positions[instance.previous_vertex + vertex - primitives[instance.first_primitive].first_vertex];
+}
+
 void main()
 {
     mesh_primitive primitive = primitives[draw.primitive];
@@ -37,8 +44,8 @@ void main()
     float handedness = instances[draw.instance].mirrored != 0u ? -1.0 : 1.0;
     out_relative = relative_position(world, position, frame.eye);
     if (MOVES)
-        out_previous_relative =
-            relative_position(instances[draw.instance].previous_world, position, frame.previous_eye);
+        out_previous_relative = relative_position(instances[draw.instance].previous_world,
+                                                  DEFORMS ? previous_position(vertex) : position, frame.previous_eye);
     out_normal = rows_rotate(normal_matrix, own.normal);
     out_geometric = rows_rotate(normal_matrix, cross(b - a, c - a));
     if (NORMAL_TEXTURE)

@@ -11,7 +11,8 @@ layout(constant_id = 1) const bool BASE_TEXTURE = true;
 layout(constant_id = 2) const bool EMISSIVE_TEXTURE = true;
 layout(constant_id = 3) const bool NORMAL_TEXTURE = true;
 layout(constant_id = 4) const bool VERTEX_COLORS = true;
-layout(constant_id = 5) const bool MOVES = true; // the camera or the instance, since the last frame
+layout(constant_id = 5) const bool MOVES = true; // the camera, the instance or its vertices, since the last frame
+layout(constant_id = 6) const bool DEFORMS = true; // the vertices do; only where MOVES
 
 layout(push_constant, scalar) uniform draw_block { uint instance; uint primitive; } draw;
 

@@ -12,6 +12,7 @@
 #extension GL_KHR_shader_subgroup_vote : require
 #extension GL_EXT_control_flow_attributes : require
 #define LGH_BLEND_CONSTANT 5
+#define GATHER_EVEN_CONSTANT 6
 #include "light_gather.glsl.h"
 #include "reservoir.glsl.h"
 
@@ -151,11 +152,13 @@ void add_light(uint j, gather_level level, gather_light g, bool mine, bool offer
 {
     vec3 v;
     gbuffer_point point = pixels[j].point;
-    float received = receive(g.position, g.spread, point, push.singularity, v);
+    float share = EVEN_LIGHTS ? gather_share(g.name) : 1.0;
+    float received = receive(g.position, g.spread, point, square_singularity(push.singularity, share), v);
     float d = dot(point.position - g.position, v);
     float blend = mine ? lgh_blend(level.kind, d * level.inverse_radius, 1.0) : 0.0;
     grid_light moments = grid_light(vec3(0.0), 0.0, vec3(0.0), 0u, vec3(0.0), g.normal, g.diagonal, g.mixed);
-    float emitted = level.vpls ? max(0.0, dot(g.normal, v)) : grid_emission(EMISSION, moments, v);
+    float emitted = level.vpls ? max(0.0, dot(g.normal, v)) + EVEN_EMISSION * (1.0 - share)
+                               : grid_emission(EMISSION, moments, share, v);
     vec3 light = g.color * (blend * received * emitted * level.factor);
     pixels[j].light.rgb += light;
     if (COUNT)
@@ -163,7 +166,7 @@ void add_light(uint j, gather_level level, gather_light g, bool mine, bool offer
     if (SAMPLES == 0u)
         return;
     float f = offered ? luminance(light) : 0.0;
-    reservoirs_offer(j, g.name, UNIFORM && f > 0.0 ? 1.0 : f);
+    reservoirs_offer(j, g.name & ~GATHER_EVEN, UNIFORM && f > 0.0 ? 1.0 : f);
 }
 
 // ---- Lists
@@ -174,7 +177,7 @@ uint level_light(gather_level level, uint i, uint tile)
     uint tiles = push.interleave * push.interleave;
     if (level.vpls) {
         uint light = push.grid_capacity + i, name = imageLoad(packed_lights, gather_texel(light) + ivec2(1, 0)).w;
-        return gather_slot_tile(name & ~RESERVOIR_VPL, tiles) == tile ? light : GATHER_NONE;
+        return gather_slot_tile(name & GATHER_NUMBER, tiles) == tile ? light : GATHER_NONE;
     }
     uint number = level.factor > 1.0 ? i * tiles + tile : i;
     return number < header.levels[level.c].occupied ? header.levels[level.c].first_light + number : GATHER_NONE;

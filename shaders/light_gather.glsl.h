@@ -95,10 +95,18 @@ struct gather_light {
     vec3 position;
     float spread;    // grid_spread
     vec3 color;
-    uint name; // in reservoirs
+    uint name; // gather_name
     vec3 normal;
-    vec3 diagonal, mixed; // second moments of the normals; their diagonal sums to 1
+    vec3 diagonal, mixed; // second moments of the normals
 };
+
+// A light's name in reservoirs has free bits between the number and RESERVOIR_VPL. They hold which share of its flux is
+// not that of surfaces, 0 to 1, and are zero where there are no lights that radiate evenly.
+const uint GATHER_NUMBER = 0x3fffffu;
+const uint GATHER_EVEN = 0x1ffu << 22;
+
+uint gather_name(uint name, float share) { return name | uint((1.0 - share) * 511.0 + 0.5) << 22; }
+float gather_share(uint name) { return 1.0 - float(name >> 22 & 0x1ffu) * (1.0 / 511.0); }
 
 ivec2 gather_texel(uint light) { return ivec2(3u * (light % GATHER_ROW), light / GATHER_ROW); }
 
@@ -111,12 +119,17 @@ uvec4 gather_pack_moments(gather_light g)
                  packSnorm2x16(vec2(g.diagonal.y, g.mixed.x)), packSnorm2x16(g.mixed.yz));
 }
 
+#ifdef GATHER_EVEN_CONSTANT
+layout(constant_id = GATHER_EVEN_CONSTANT) const bool EVEN_LIGHTS = false; // there are lights that radiate evenly
 gather_light gather_unpack(uvec4 position, uvec4 color, uvec4 moments)
 {
     vec4 p = uintBitsToFloat(position);
     vec2 a = unpackSnorm2x16(moments.x), b = unpackSnorm2x16(moments.y), d = unpackSnorm2x16(moments.z);
-    return gather_light(p.xyz, p.w, uintBitsToFloat(color.rgb), color.a, vec3(a, b.x), vec3(b.y, d.x, 1.0 - b.y - d.x),
+    // The trace of the second moments is the surfaces' share.
+    float last = (EVEN_LIGHTS ? gather_share(color.a) : 1.0) - b.y - d.x;
+    return gather_light(p.xyz, p.w, uintBitsToFloat(color.rgb), color.a, vec3(a, b.x), vec3(b.y, d.x, last),
                         vec3(d.y, unpackSnorm2x16(moments.w)));
 }
+#endif
 
 #endif

@@ -26,11 +26,14 @@ void main()
     if (VPLS) {
         uint slot = order[i];
         vpl v = vpls[slot];
-        g = gather_light(v.position, 0.0, v.color, slot | RESERVOIR_VPL, v.normal, vec3(0.0), vec3(0.0));
+        float share = surface_share(v);
+        g = gather_light(v.position, share == 0.0 ? even_near() : 0.0, v.color, gather_name(slot | RESERVOIR_VPL, share),
+                         v.normal, vec3(0.0), vec3(0.0));
     } else {
         grid_light light = grid_lights[i];
         g = gather_light(light.intensity > 0.0 ? light.position : OUT_OF_REACH, grid_spread(EMISSION, light), light.color,
-                         i, light.normal, light.moment_diagonal, light.moment_mixed);
+                         gather_name(i, surface_share(light.moment_diagonal)), light.normal, light.moment_diagonal,
+                         light.moment_mixed);
     }
     ivec2 texel = gather_texel(VPLS ? push.grid_capacity + i : i);
     imageStore(packed_lights, texel, gather_pack_position(g));

@@ -23,7 +23,9 @@ void main()
     grid_light light = grid_light(light_position.xyz, 0.0, light_color, light_names.y, vec3(0.0), light_normal,
                                   light_diagonal, light_mixed);
     vec3 v;
-    float received = receive(light.position, light_spread, pixel.point, push.singularity, v);
-    float emitted = push.draw == DRAW_VPLS ? max(0.0, dot(light.normal, v)) : grid_emission(push.emission, light, v);
+    float square_b = square_singularity(push.singularity, light_share);
+    float received = receive(light.position, light_spread, pixel.point, square_b, v);
+    float emitted = push.draw == DRAW_VPLS ? max(0.0, dot(light.normal, v)) + EVEN_EMISSION * (1.0 - light_share)
+                                           : grid_emission(push.emission, light, light_share, v);
     add_light(pixel, light.color * (received * emitted), blend, light_names.x, light.vertex, light_names.z);
 }

@@ -86,6 +86,11 @@ void main()
     light_position = vec4(light.position, radius);
     light_color = light.color * factor;
     light_spread = grid_spread(push.emission, light);
+    light_share = surface_share(light.moment_diagonal);
+    if (push.draw == DRAW_VPLS) {
+        light_share = surface_share(vpls[v.light]);
+        light_spread = light_share == 0.0 ? even_near() : 0.0;
+    }
     light_normal = light.normal;
     light_diagonal = light.moment_diagonal;
     light_mixed = light.moment_mixed;

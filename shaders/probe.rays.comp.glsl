@@ -18,7 +18,8 @@ layout(set = 0, binding = 2) uniform sampler2D normal_map;
 layout(set = 0, binding = 3, scalar) writeonly buffer probes_block { probe probes[]; };
 layout(set = 0, binding = 6, scalar) writeonly buffer estimates_block { vec3 estimates[]; };
 layout(push_constant, scalar) uniform push_block {
-    uint slots, second_half; // slots from second_half on are of the second half of the paths
+    uint slots, second_half; // slots from second_half on are of the second half of the paths,
+    uint lights;             // and those from `lights` on are lights, of which each half has half
     uint first;              // index of the first probe in the sequence of pixels
     float singularity;       // b, metres
 } push;
@@ -30,6 +31,12 @@ vec3 slot_light(uint slot, gbuffer_point p)
 {
     vpl light = vpls[slot];
     return light.intensity > 0.0 ? vpl_light(light, p, push.singularity) : vec3(0.0);
+}
+
+// How much of a slot's light belongs to a half.
+float half_share(uint slot, uint which)
+{
+    return slot >= push.lights ? 0.5 : (slot < push.second_half) == (which == 0u) ? 1.0 : 0.0;
 }
 
 // Pixels by the R2 sequence (Roberts 2018), whose every stretch is spread evenly over the picture.
@@ -46,7 +53,8 @@ void sum_own(uint self, gbuffer_point p)
     for (uint slot = self; slot < push.slots; slot += GROUP) {
         vec3 light = slot_light(slot, p);
         color += light;
-        halves[slot < push.second_half ? 0 : 1] += luminance(light);
+        for (uint which = 0u; which < 2u; which++)
+            halves[which] += half_share(slot, which) * luminance(light);
     }
     colors[self] = color;
     sums[0][self] = halves[0];
@@ -83,9 +91,7 @@ uint slot_at(uint which, float target, gbuffer_point p)
     uint lane = invocation_at(which, target), chosen = 0u;
     float rest = target - (lane > 0u ? sums[which][lane - 1u] : 0.0);
     for (uint slot = lane; slot < push.slots; slot += GROUP) {
-        if ((slot < push.second_half) != (which == 0u))
-            continue;
-        float light = luminance(slot_light(slot, p));
+        float light = half_share(slot, which) * luminance(slot_light(slot, p));
         if (light <= 0.0)
             continue;
         chosen = slot;

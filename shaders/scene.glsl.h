@@ -15,6 +15,9 @@ layout(set = 1, binding = SCENE_MATERIALS, scalar) readonly buffer materials_blo
 layout(set = 1, binding = SCENE_LIGHTS, scalar) readonly buffer lights_block { punctual_light lights[]; };
 layout(set = 1, binding = SCENE_EMITTERS, scalar) readonly buffer emitters_block { emissive_triangle emitters[]; };
 layout(set = 1, binding = SCENE_LIGHT_CDF, scalar) readonly buffer light_cdf_block { float light_cdf[]; };
+layout(set = 1, binding = SCENE_PREVIOUS_POSITIONS, scalar) readonly buffer previous_positions_block {
+    vec3 previous_positions[];
+};
 layout(set = 1, binding = SCENE_TEXTURES) uniform sampler2D textures[];
 
 vec2 texture_uv(texture_reference reference, vec2 uv0, vec2 uv1)

@@ -26,7 +26,10 @@ vec3 end_point_light(grid_light light, uint index, uint c, vec3 centre_light, gb
     if (slot == LGH_NO_SAMPLE)
         return centre_light;
     end = vpls[slot].position;
-    vec3 sent = vpl_light(vpls[slot], p, push.singularity);
+    // A light of its own has no singularity, but what it stands for here is farther away: b keeps the sample's weight
+    // from it where it happens to be near.
+    float nearest = surface_share(vpls[slot]) == 0.0 ? push.singularity * push.singularity : 0.0;
+    vec3 sent = vpl_light_from(vpls[slot], nearest, p, push.singularity);
     return sent * (light.intensity / vpls[slot].intensity);
 }
 

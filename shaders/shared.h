@@ -37,6 +37,7 @@ typedef uint32_t uint;
 #define SCENE_LIGHTS 7     // punctual_light
 #define SCENE_EMITTERS 8   // emissive_triangle
 #define SCENE_LIGHT_CDF 9  // float per light source: inclusive sums of the choice probabilities, last is 1
+#define SCENE_PREVIOUS_POSITIONS 10 // vec3 per vertex of a deforming mesh: where it was in the last frame
 #define SCENE_TEXTURES 12
 
 SHARED_STRUCT(frame_constants) {
@@ -86,7 +87,9 @@ SHARED_STRUCT(mesh_instance_gpu) {
     uint first_primitive, primitive_count;
     uint mirrored;                  // 1: the determinant is negative
     uint mesh;
-} SHARED_END(mesh_instance_gpu, 160)
+    uint previous_vertex;           // its first vertex in the previous positions; PREVIOUS_SAME: they are as they were
+} SHARED_END(mesh_instance_gpu, 164)
+#define PREVIOUS_SAME 0xffffffffu
 
 #define TEXTURE_NONE 0xffffffffu
 SHARED_STRUCT(texture_reference) {
@@ -138,11 +141,72 @@ SHARED_STRUCT(emissive_triangle) {
     uint triangle;
 } SHARED_END(emissive_triangle, 112)
 
+// ---- Deformation of vertices (modules/deform.h)
+
+#define DEFORM_INFLUENCES 8
+SHARED_STRUCT(deform_vertex) { // at rest, mesh space
+    SHARED_VEC3(position);
+    SHARED_VEC3(normal);
+    SHARED_VEC4(tangent); // w: 0: none
+} SHARED_END(deform_vertex, 40)
+
+SHARED_STRUCT(deform_influences) {
+    uint joints[DEFORM_INFLUENCES / 2]; // pairs of 16 bits, the first is the lower half
+    float weights[DEFORM_INFLUENCES];   // sum 1
+} SHARED_END(deform_influences, 48)
+
+SHARED_STRUCT(deform_offset) { // that a morph target of weight 1 adds
+    SHARED_VEC3(position);
+    SHARED_VEC3(normal);
+    SHARED_VEC3(tangent);
+} SHARED_END(deform_offset, 36)
+
+SHARED_STRUCT(deform_joint) { // rows of the matrix from the mesh at rest to the world
+    SHARED_VEC4(rows[3]);
+} SHARED_END(deform_joint, 48)
+
+SHARED_STRUCT(deform_target) { // a morph target in use
+    uint first_offset; // of its vertices, index into the offsets
+    float weight;
+} SHARED_END(deform_target, 8)
+
+SHARED_STRUCT(deform_range) { // the vertices of one mesh
+    uint vertex_count;
+    uint first_vertex;    // in the scene's positions and attributes
+    uint first_kept;      // in the vertices at rest and the previous positions
+    uint first_influence; // of the first vertex
+    uint first_joint;
+    uint is_skinned;
+    uint first_target, target_count;
+} SHARED_END(deform_range, 32)
+
 // ---- Passes over pixels
 
 // Invocations of a workgroup, all in one row: on a CPU device a tile of 8x8 takes up to half as long again, since the rows
 // of all images of one size fall on the same few sets of its cache.
 #define PIXEL_GROUP_WIDTH 64
+
+// ---- Subdivision surfaces (modules/subdivision.h)
+
+#define SUBDIVIDE_GROUP 64 // invocations of a workgroup, one a vertex
+
+SHARED_STRUCT(subdivision_entry) { // of a stencil
+    uint vertex; // of the cage
+    float position, tangent1, tangent2; // weights
+} SHARED_END(subdivision_entry, 16)
+
+SHARED_STRUCT(subdivision_vertex) { // of a refined mesh
+    uint stencil;
+    SHARED_VEC2(tangent); // the texture's tangent is x * tangent1 + y * tangent2; both 0: none
+} SHARED_END(subdivision_vertex, 12)
+
+SHARED_STRUCT(subdivision_step) { // of one refined mesh
+    uint first_source; // vertex that the entries count from
+    uint first_vertex, vertex_count; // what is written
+    uint first; // of its subdivision_vertex structs
+    uint first_kept; // in the previous positions
+    uint is_new; // 1: it was not drawn in the last frame, so that its vertices have not moved since
+} SHARED_END(subdivision_step, 24)
 
 // ---- Rays
 
@@ -212,7 +276,7 @@ SHARED_STRUCT(vpl) {
     float intensity;       // luminance of `color`; 0: an empty slot
     SHARED_VEC3(color);    // cd per channel: flux * albedo / pi
     uint path;
-    SHARED_VEC3(normal);   // unit geometric normal on the lit side
+    SHARED_VEC3(normal);   // unit geometric normal on the lit side; 0: a point light of color / 4 cd, see lgh_shade.glsl.h
     uint bounce;           // 0 is the first hit
 } SHARED_END(vpl, 48)
 
@@ -262,7 +326,7 @@ SHARED_STRUCT(grid_light) {
     uint vertex;            // x | y << 10 | z << 20, on the grid of its level
     SHARED_VEC3(deviation); // standard deviation of the lights' positions, per axis, metres
     SHARED_VEC3(normal);    // mean normal m, not unit
-    SHARED_VEC3(moment_diagonal); // second moment M of the normals
+    SHARED_VEC3(moment_diagonal); // second moment M of the normals; its trace is the share of VPLs of surfaces
     SHARED_VEC3(moment_mixed);
 } SHARED_END(grid_light, 80)
 

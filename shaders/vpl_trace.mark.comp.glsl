@@ -16,6 +16,7 @@ layout(push_constant, scalar) uniform push_block {
     uint slot_count, bounces;
     uint path_count;
     uint box_count;
+    uint changed_count; // slots of VPLs and, behind, of lights
 } push;
 
 shared uint group_mask[2];
@@ -62,6 +63,6 @@ void main()
     barrier();
     if (lane < 2u)
         mask[gl_WorkGroupID.x * 2u + lane] = group_mask[lane];
-    if (path < (push.slot_count + 31u) / 32u)
-        changed[path] = 0u;
+    for (uint word = path; word < (push.changed_count + 31u) / 32u; word += gl_NumWorkGroups.x * 64u)
+        changed[word] = 0u;
 }

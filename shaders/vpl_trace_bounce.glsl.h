@@ -9,41 +9,22 @@
 #define RAY_ORIGINS_BINDING 1
 #include "rays.glsl.h"
 #include "sobol.glsl.h"
-#include "vpl_trace.glsl.h"
+#define VPLS_BINDING 4
+#ifdef LIST_BINDING
+#define CHANGED_BINDING (LIST_BINDING + 1)
+#endif
+#include "vpl_trace_slots.glsl.h"
 
 layout(local_size_x = 64) in;
 layout(set = 0, binding = 3, scalar) buffer flux_block { vec3 flux[]; }; // of the path before the hit, by ray
-layout(set = 0, binding = 4, scalar) buffer vpls_block { vpl vpls[]; };
 layout(set = 0, binding = 5, scalar) readonly buffer hits_block { ray_hit hits[]; };
 layout(set = 0, binding = 6, scalar) readonly buffer shares_block { vpl_share shares[]; };
 layout(set = 0, binding = 7, scalar) readonly buffer sources_block { vpl_source sources[]; };
-#ifdef LIST_BINDING
-layout(set = 0, binding = LIST_BINDING + 1, scalar) buffer changed_block { uint changed[]; }; // a bit a slot
-#endif
 layout(push_constant, scalar) uniform push_block {
     uint slot_count, bounces;
     uint bounce;
     uint last; // 1: no path goes on
 } push;
-
-#ifdef LIST_BINDING
-bool is_same(vpl a, vpl b)
-{
-    return all(equal(floatBitsToUint(vec4(a.position, a.intensity)), floatBitsToUint(vec4(b.position, b.intensity)))) &&
-           all(equal(floatBitsToUint(a.color), floatBitsToUint(b.color))) &&
-           all(equal(floatBitsToUint(a.normal), floatBitsToUint(b.normal))) && a.bounce == b.bounce;
-}
-#endif
-
-void slot_write(uint slot, vpl light)
-{
-#ifdef LIST_BINDING
-    if (is_same(light, vpls[slot]))
-        return;
-    atomicOr(changed[slot / 32u], 1u << (slot & 31u));
-#endif
-    vpls[slot] = light;
-}
 
 // The direction in which the path goes on.
 vec3 direction_from(uint path, vec3 normal)

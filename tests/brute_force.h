@@ -26,7 +26,7 @@ static void brute_force_setup(renderer *r, void *state)
     brute_force *pass = state;
     pass->width = r->settings.width;
     pass->height = r->settings.height;
-    pass->push.slot_count = renderer_vpl_slots(r);
+    pass->push.slot_count = renderer_slots(r);
     pass->push.singularity = renderer_singularity(r);
     const frame_graph_pass_desc desc = {
         .name = "brute_force", .kind = FRAME_GRAPH_COMPUTE, .execute = brute_force_execute, .user = pass};

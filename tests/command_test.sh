@@ -162,6 +162,11 @@ refuses 1 "folder.png" compare "$work/grey.exr" "$work/grey.exr" --map "$work/fo
 
 echo "scenes that lack something"
 refuses 1 "attic" render "$cornell" --camera attic
+refuses 1 'there is no animation "walk"; it has none' render "$cornell" --animation walk
+refuses 1 'there is no animation "all"' render "$cornell" --animation all
+refuses 1 "--time: nothing moves without --animation" render "$cornell" --time 1
+refuses 1 "--time: expected a number of seconds" render "$cornell" --animation all --time=-1
+refuses 2 "--time: expected a number of seconds" render "$cornell" --animation all --time soon
 echo '{"asset": {"version": "2.0"}, "scenes": [{"nodes": []}]}' >"$work/nothing.gltf"
 refuses 1 "no geometry" render "$work/nothing.gltf"
 triangle required.gltf '"extensionsUsed": ["EXT_nonsense"], "extensionsRequired": ["EXT_nonsense"],'
@@ -189,7 +194,7 @@ done
 run render --help
 for option in -o --size --camera --eye --target --fov --vpls --bounces --alpha --levels --shadow-samples --interleave \
   --emission --end-point --frames --seed --exposure --only --no-filter --no-taa --start-level --no-sample-s1 --blend --sampling \
-  --reservoirs --build --s1 --singularity --sun --aov --stats --dump-graph --device --validate; do
+  --reservoirs --build --s1 --singularity --sun --animation --time --aov --stats --dump-graph --device --validate; do
   grep -q -- "^  $option " "$work/stdout" || fail "render --help has no $option"
 done
 for default in "default 1280x720" "default 100000" "default 3" "default 1" "default auto" "default AB" "default vpl" \
@@ -303,6 +308,33 @@ code=$?
 grep -q "interrupted after" "$work/stderr" || fail "interrupted, and does not say so: $(cat "$work/stderr")"
 { [ -s a.png ] && [ ! -e b.exr ]; } || fail "interrupted: a.png is missing or b.exr is there"
 rm -f ./*
+
+# ---- Animations
+
+echo "a scene is posed at the time that is asked for, in a loop"
+z='\0\0\0\0' p='\0\0\200\77' m='\0\0\200\277' # 0, 1 and -1 as floats
+numbers=$(printf "$m$m$z$p$m$z$z$p$z$z$p$z$z$z$p$z$z" | base64 -w 0) # a triangle, two times, two places
+cat >"$work/moving.gltf" <<EOT
+{"asset": {"version": "2.0"}, "nodes": [{"mesh": 0}], "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
+ "accessors": [{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3"},
+  {"bufferView": 0, "byteOffset": 36, "componentType": 5126, "count": 2, "type": "SCALAR"},
+  {"bufferView": 0, "byteOffset": 44, "componentType": 5126, "count": 2, "type": "VEC3"}],
+ "bufferViews": [{"buffer": 0, "byteLength": 68}],
+ "buffers": [{"byteLength": 68, "uri": "data:application/octet-stream;base64,$numbers"}],
+ "animations": [{"name": "walk", "samplers": [{"input": 1, "output": 2}],
+  "channels": [{"sampler": 0, "target": {"node": 0, "path": "translation"}}]}]}
+EOT
+moving=(../moving.gltf --sun=0,0,-1,10 "${small[@]}")
+renders "${moving[@]}" -o rest.png
+renders "${moving[@]}" --animation walk -o start.png
+renders "${moving[@]}" --animation walk --time 0.5 -o half.png
+renders "${moving[@]}" --animation all --time 3.5 -o later.png
+cmp rest.png start.png || fail "the start of a clip that starts at rest is not the picture at rest"
+cmp half.png later.png || fail "a clip of one second is elsewhere three seconds later"
+cmp -s rest.png half.png && fail "--time changes nothing"
+rm -f ./*
+refuses 1 'there is no animation "run"; its animations are "walk"' render "${moving[@]}" --animation run
+run info ../moving.gltf && grep -q '^  "walk": 1 s, 1 channels$' "$work/stdout" || fail "info does not list the animation: $(cat "$work/stdout")"
 
 # ---- References: progressive methods, their state files, instant radiosity.
 

@@ -722,7 +722,7 @@ static gpu_acceleration layers_create(bool opaque)
         .triangle_count = 2,
         .opaque = opaque,
     };
-    const gpu_acceleration blas = gpu_blas_create(device, &triangles, 1);
+    const gpu_acceleration blas = gpu_blas_create(device, &triangles, 1, false);
     gpu_buffer_destroy(device, index_buffer);
     gpu_buffer_destroy(device, position_buffer);
     return blas;

@@ -8,9 +8,8 @@
 #include "modules/rays.h"
 #include "modules/world.h"
 #include "quad_scene.h"
+#include "ray_batch.h"
 #include "test.h"
-
-#include "test_shaders_shaders.h"
 
 #include <embree3/rtcore.h>
 #include <unistd.h>
@@ -20,58 +19,6 @@
 
 static gpu *device;
 static const uint32_t tracers[] = {RAYS_QUERY, RAYS_PIPELINE, RAYS_EMBREE};
-
-typedef struct ray {
-    float origin[3], reach, direction[3], unused;
-} ray;
-
-typedef struct answers {
-    ray_hit *hits; // per ray
-    uint32_t *visible;
-} answers;
-
-// ---- A pass of our own: traces a list of rays in two batches, "near" for hits and "seen" for visibility
-
-typedef struct batch_pass {
-    gpu_pipeline pipeline;
-    gpu_buffer list;
-    uint32_t count;
-} batch_pass;
-
-static void batch_execute(const frame_graph_context *context, void *user)
-{
-    const batch_pass *pass = user;
-    frame_graph_bind(context, pass->pipeline);
-    gpu_push(context->commands, &pass->count, sizeof pass->count);
-    gpu_dispatch(context->commands, div_up_u32(pass->count, 64), 1, 1);
-}
-
-static void batch_make(renderer *r, batch_pass *state, const char *batch, rays_kind kind)
-{
-    frame_graph_pass *pass = frame_graph_pass_add(
-        r->graph,
-        &(frame_graph_pass_desc){.name = batch, .kind = FRAME_GRAPH_COMPUTE, .execute = batch_execute, .user = state});
-    frame_graph_read(pass, "list", ACCESS_STORAGE_READ);
-    rays_create(r, pass, batch, state->count);
-    rays_trace(r, batch, kind, state->count);
-}
-
-static void batch_setup(renderer *r, void *user)
-{
-    batch_pass *state = user;
-    frame_graph_import_buffer(r->graph, "list", state->list, ACCESS_HOST_WRITE, ACCESS_NONE);
-    batch_make(r, state, "near", RAYS_NEAREST);
-    batch_make(r, state, "seen", RAYS_VISIBLE);
-}
-
-static void batch_fini(renderer *r, void *user)
-{
-    batch_pass *state = user;
-    gpu_pipeline_destroy(r->gpu, state->pipeline);
-    gpu_buffer_destroy(r->gpu, state->list);
-}
-
-// ---- Helpers
 
 static renderer *renderer_of(const scene_data *scene)
 {
@@ -84,57 +31,8 @@ static renderer *renderer_of(const scene_data *scene)
         printf("no renderer\n");
         exit(EXIT_FAILURE);
     }
-    batch_pass *state = renderer_pass_add(r, "test_batch", sizeof(batch_pass), batch_setup, batch_fini);
-    state->pipeline =
-        gpu_compute_pipeline_create(device, &(gpu_compute_pipeline_desc){.shader = &shader_rays_copy_comp});
-    CHECK(state->pipeline.id != 0);
-    r->exports[r->export_count++] = "near_hits";
-    r->exports[r->export_count++] = "seen_visible";
+    batch_add(r);
     return r;
-}
-
-static void export_read(renderer *r, const char *name, void *data, size_t size)
-{
-    const gpu_buffer buffer = frame_graph_find_buffer(r->graph, name);
-    CHECK(buffer.id && (size == 0 || gpu_buffer_read(device, buffer, 0, data, size)));
-}
-
-// Renders a frame that traces the rays.
-static answers trace(renderer *r, uint32_t tracer, const ray *rays, uint32_t count)
-{
-    batch_pass *state = ((render_pass *)ecs_get(r->world, renderer_pass_find(r, "test_batch"), r->pass))->state;
-    const gpu_buffer_desc desc = {.name = "list",
-                                  .size = count * sizeof *rays,
-                                  .usage = VK_BUFFER_USAGE_STORAGE_BUFFER_BIT,
-                                  .host = true,
-                                  .data = rays};
-    gpu_buffer_destroy(device, state->list);
-    state->list = gpu_buffer_create(device, &desc);
-    state->count = count;
-    r->settings.rays = tracer;
-    CHECK(state->list.id && renderer_frame(r));
-    CHECK(rays_tracer(r) == tracer && rays_are_host(r) == (tracer == RAYS_EMBREE));
-    const answers a = {memory_alloc(max_u32(count, 1) * sizeof *a.hits),
-                       memory_alloc(max_u32(count, 1) * sizeof *a.visible)};
-    export_read(r, "near_hits", a.hits, count * sizeof *a.hits);
-    export_read(r, "seen_visible", a.visible, count * sizeof *a.visible);
-    return a;
-}
-
-static void answers_free(answers *a)
-{
-    free(a->hits);
-    free(a->visible);
-}
-
-static bool pass_ran(const renderer *r, const char *name)
-{
-    uint32_t count;
-    const frame_graph_timing *timings = frame_graph_timings(r->graph, &count);
-    for (uint32_t i = 0; i < count; i++)
-        if (strcmp(timings[i].name, name) == 0)
-            return true;
-    return false;
 }
 
 static void matrix_at(float matrix[16], float x, float y, float z)
@@ -617,13 +515,43 @@ TEST(only_the_structure_that_is_traced_is_built)
     quad_scene s;
     quad_scene_init(&s);
     quad_add(&s, IDENTITY);
-    renderer *r = renderer_of(&s.data);
     const ray down = {{0, 0, 1}, 1, {0, 0, -1}, 0};
     for (size_t t = 0; t < countof(tracers); t++) {
+        renderer *r = renderer_of(&s.data);
         answers a = trace(r, tracers[t], &down, 1);
         CHECK(pass_ran(r, "near/trace") && pass_ran(r, "seen/trace"));
         CHECK(pass_ran(r, "acceleration") == (tracers[t] != RAYS_EMBREE));
         CHECK(pass_ran(r, "rays/scene") == (tracers[t] == RAYS_EMBREE));
+        answers_free(&a);
+        renderer_destroy(r);
+    }
+}
+
+TEST(a_structure_is_built_again_when_something_moved)
+{
+    quad_scene s;
+    quad_scene_init(&s);
+    quad_add(&s, IDENTITY);
+    renderer *r = renderer_of(&s.data);
+    const ray down = {{0, 0, 1}, 2, {0, 0, -1}, 0};
+    // Whether the quad moves away or back before the frame; while Embree traces, nobody builds.
+    static const struct {
+        bool moves;
+        uint32_t tracer;
+        bool built;
+    } frames[] = {
+        {false, RAYS_QUERY, true},  {false, RAYS_QUERY, false}, {true, RAYS_PIPELINE, true}, {false, RAYS_QUERY, false},
+        {true, RAYS_EMBREE, false}, {false, RAYS_QUERY, true},  {false, RAYS_QUERY, false},
+    };
+    bool away = false;
+    for (size_t i = 0; i < countof(frames); i++) {
+        for (ecs_iterator it = ecs_iterate(r->world, r->gpu_world->node); ecs_next(&it);) {
+            away ^= frames[i].moves;
+            ((node_component *)it.component)->matrix[12] = away ? 5 : 0;
+        }
+        answers a = trace(r, frames[i].tracer, &down, 1);
+        CHECK(pass_ran(r, "acceleration") == frames[i].built);
+        CHECK((a.hits[0].instance == RAY_MISS) == away && a.visible[0] == away);
         answers_free(&a);
     }
     renderer_destroy(r);
@@ -661,7 +589,7 @@ TEST(embree_is_refused_where_the_device_is_not_a_cpu)
     log_sink_set(NULL, NULL);
     CHECK(errors == 1 && strstr(last_error, "--rays embree") && strstr(last_error, gpu_name(device)));
     r->settings.rays = RAYS_AUTO;
-    CHECK(renderer_frame(r) && !rays_are_host(r) && pass_ran(r, "acceleration"));
+    CHECK(renderer_frame(r) && !rays_are_host(r) && pass_ran(r, "seen/trace"));
     renderer_destroy(r);
     device->properties.deviceType = type;
 }
@@ -903,6 +831,7 @@ int main(int argc, char **argv)
     RUN(an_empty_batch_is_traced);
     RUN(embree_gives_the_same_bytes_every_time);
     RUN(only_the_structure_that_is_traced_is_built);
+    RUN(a_structure_is_built_again_when_something_moved);
     RUN(embree_is_refused_where_the_device_is_not_a_cpu);
     RUN(auto_is_embree_where_the_device_is_a_cpu);
     RUN(the_validation_layer_is_silent);

@@ -202,6 +202,23 @@ TEST(a_step_of_cost_is_followed)
     CHECK_NEAR(true_milliseconds(&sim, &r.settings), 300, 45);
 }
 
+// The VPLs' part of the error looks like nothing for a while: near the target that must not end in a leap.
+TEST(near_the_target_a_change_goes_a_little_way)
+{
+    simulation sim = plain;
+    run r = run_start(640, 360, 250, 0);
+    run_frames(&r, &sim, 30);
+    CHECK_NEAR(true_milliseconds(&sim, &r.settings) / 250, 1, 0.15);
+    const render_settings before = r.settings;
+    sim.speed = 1.4; // calls for a change
+    for (uint32_t i = 0; i < 100 && choices_equal(&r.settings, &before); i++) {
+        r.controller.error_sums[AUTOMATIC_VPL_SET] = 0;
+        run_frames(&r, &sim, 1);
+    }
+    CHECK(!choices_equal(&r.settings, &before));
+    CHECK(r.settings.vpls > before.vpls / 5 && r.settings.vpls < before.vpls * 5);
+}
+
 TEST(changes_come_to_an_end_whatever_the_noise)
 {
     simulation sim = plain;
@@ -337,6 +354,7 @@ int main(void)
     RUN(too_little_time_gives_about_the_fastest_there_is);
     RUN(more_time_gives_less_error);
     RUN(a_step_of_cost_is_followed);
+    RUN(near_the_target_a_change_goes_a_little_way);
     RUN(changes_come_to_an_end_whatever_the_noise);
     RUN(error_is_reached_within_a_factor_of_1_3);
     RUN(error_does_not_depend_on_time);

@@ -46,6 +46,7 @@ TEST(defaults_are_the_documented_ones)
     CHECK_NEAR(settings.singularity, 0.003, 1e-9);
     CHECK(settings.only == ONLY_ALL && settings.seed == 1 && settings.auto_exposure && settings.frames == 8);
     CHECK(settings.method == METHOD_LGH && settings.rays == RAYS_AUTO);
+    CHECK(settings.many_lights == 256);
     CHECK(settings.spp == 64 && settings.until == 0 && settings.ir_vpls == 300);
 }
 

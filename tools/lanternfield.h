@@ -30,6 +30,9 @@ typedef struct render_request { // strings belong to argv
     float eye[3], target[3]; // world, metres
     float fov; // degrees, vertical
     float sun[4]; // direction in which the light travels, lux
+    const char *animation; // name, or "all"; NULL: at rest
+    bool has_time;
+    float time; // seconds
     const char *stats, *dump_graph, *device; // NULL: not asked for
     const char *state; // file that keeps a progressive picture; NULL: none
     bool validate;

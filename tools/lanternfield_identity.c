@@ -41,6 +41,49 @@ static uint64_t geometry_hash(const scene_data *s)
     return hash;
 }
 
+static uint64_t deformations_hash(const scene_data *s)
+{
+    uint64_t hash = hash_start;
+    for (uint32_t i = 0; i < s->deformation_count; i++) {
+        const scene_deformation *const d = &s->deformations[i];
+        const size_t morphs = (size_t)d->target_count * d->vertex_count;
+        hash = hash_word(hash, d->mesh);
+        hash = hash_word(hash, d->node);
+        hash = hash_word(hash, d->skin);
+        hash = hash_bytes(hash, d->influences, d->influences ? d->vertex_count * sizeof(*d->influences) : 0);
+        hash = hash_bytes(hash, d->morphs, morphs * sizeof(*d->morphs));
+        hash = hash_bytes(hash, d->weights, d->target_count * sizeof(*d->weights));
+    }
+    for (uint32_t i = 0; i < s->skin_count; i++) {
+        const scene_skin *const skin = &s->skins[i];
+        hash = hash_bytes(hash, skin->joints, skin->joint_count * sizeof(*skin->joints));
+        hash = hash_bytes(hash, skin->inverse_bind, skin->joint_count * sizeof(*skin->inverse_bind));
+    }
+    return hash;
+}
+
+static uint64_t channel_hash(uint64_t hash, const scene_channel *channel)
+{
+    const size_t parts = channel->interpolation == SCENE_CUBIC ? 3 : 1;
+    hash = hash_word(hash, channel->target);
+    hash = hash_word(hash, channel->index);
+    hash = hash_word(hash, channel->interpolation);
+    hash = hash_bytes(hash, channel->times, channel->key_count * sizeof(*channel->times));
+    return hash_bytes(hash, channel->values, channel->key_count * parts * channel->width * sizeof(*channel->values));
+}
+
+static uint64_t animations_hash(const scene_data *s)
+{
+    uint64_t hash = hash_start;
+    for (uint32_t i = 0; i < s->animation_count; i++) {
+        hash = hash_word(hash, s->animations[i].channel_count);
+        for (uint32_t k = 0; k < s->animations[i].channel_count; k++) {
+            hash = channel_hash(hash, &s->animations[i].channels[k]);
+        }
+    }
+    return hash;
+}
+
 static uint64_t nodes_hash(const scene_data *s)
 {
     uint64_t hash = hash_start;
@@ -100,6 +143,17 @@ void scene_identity_print(FILE *out, const scene_data *scene)
     };
     for (size_t i = 0; i < countof(parts); i++) {
         fprintf(out, "%s %016llx\n", parts[i].name, (unsigned long long)parts[i].hash(scene));
+    }
+    if (scene->deformation_count > 0) {
+        fprintf(out, "deformations %016llx\n", (unsigned long long)deformations_hash(scene));
+    }
+}
+
+static void motion_print(FILE *out, const scene_data *scene, const render_request *request)
+{
+    if (request->animation) {
+        fprintf(out, "animations %016llx\n", (unsigned long long)animations_hash(scene));
+        fprintf(out, "animation %s\ntime %.9g\n", request->animation, (double)request->time);
     }
 }
 
@@ -185,6 +239,7 @@ char *render_identity(const render_session *session, const render_request *reque
     assert(out);
     fputs("program lanternfield " LANTERNFIELD_VERSION "\n", out);
     scene_identity_print(out, session->scene);
+    motion_print(out, session->scene, request);
     view_print(out, &session->renderer->camera, request);
     settings_print(out, &session->renderer->settings);
     fclose(out);

@@ -98,6 +98,21 @@ static bool sun_read(render_request *request, const char *value, setting_error *
            option_refuse(error, "--sun", "dx,dy,dz,LUX with a direction that is not zero and at least 0 lux", value);
 }
 
+static bool animation_read(render_request *request, const char *value, setting_error *error)
+{
+    (void)error;
+    request->animation = value;
+    return true;
+}
+
+static bool time_read(render_request *request, const char *value, setting_error *error)
+{
+    request->has_time = true;
+    const bool is_number = numbers_read(value, &request->time, 1);
+    error->out_of_range = is_number;
+    return (is_number && request->time >= 0) || refuse(error, "--time", "a number of seconds, 0 or more", value);
+}
+
 static bool stats_read(render_request *request, const char *value, setting_error *error)
 {
     (void)error;
@@ -149,6 +164,9 @@ static const command_option view_options[] = {
     {"target", "x,y,z", "the point that the camera looks at, in metres", target_read},
     {"fov", "DEG", "vertical field of view in degrees, 1 to 179 (default: the camera's)", fov_read},
     {"sun", "dx,dy,dz,LUX", "add a directional light that travels along dx,dy,dz (default: none)", sun_read},
+    {"animation", "NAME|all", "pose the scene by its animation NAME, or by all of them (default: as it is at rest)",
+     animation_read},
+    {"time", "SECONDS", "the moment of --animation that is shown; animations repeat (default 0)", time_read},
 };
 static const command_option device_options[] = {
     {"device", "NAME", "first device whose name contains NAME (default: the first that has all it takes)", device_read},
@@ -241,6 +259,10 @@ bool render_request_fits(const render_request *request)
     const char *const refusal = automatic_refusal(settings);
     if (refusal) {
         log_error("%s", refusal);
+        return false;
+    }
+    if (request->has_time && !request->animation) {
+        log_error("--time: nothing moves without --animation");
         return false;
     }
     for (uint32_t i = 0; i < request->aov_count; i++) {

@@ -1,6 +1,7 @@
 // `lanternfield render`: loads a scene, renders its frames and writes what was asked for.
 #include "lanternfield.h"
 
+#include "modules/animation_system.h"
 #include "modules/automatic_system.h"
 #include "modules/rays.h"
 #include "modules/world.h"
@@ -109,6 +110,38 @@ static bool camera_place(renderer *r, const render_request *request, uint32_t ca
         return false;
     }
     return true;
+}
+
+// ---- Animation
+
+// False, and the animations are listed, when the one that is asked for does not exist.
+static bool animation_check(const scene_data *scene, const char *name)
+{
+    const bool all = name && strcmp(name, "all") == 0 && scene->animation_count > 0;
+    if (!name || all || animation_find(scene, name) != SCENE_NONE) {
+        return true;
+    }
+    arena names = {0};
+    const char *list = scene->animation_count > 0 ? "its animations are" : "it has none";
+    for (uint32_t i = 0; i < scene->animation_count; i++) {
+        list = arena_printf(&names, "%s%s \"%s\"", list, i ? "," : "", scene->animations[i].name);
+    }
+    log_error("%s: there is no animation \"%s\"; %s", scene->path, name, list);
+    arena_fini(&names);
+    return false;
+}
+
+// Before the camera is placed, which may be on a node that moves.
+static void animations_play(renderer *r, const render_request *request)
+{
+    const bool all = request->animation && strcmp(request->animation, "all") == 0;
+    r->time = (double)request->time;
+    for (uint32_t i = 0; request->animation && i < r->scene->animation_count; i++) {
+        if (all || i == animation_find(r->scene, request->animation)) {
+            animation_play(r, &(animation_clip){.animation = i, .speed = 1, .loop = true});
+        }
+    }
+    animation_update(r);
 }
 
 // ---- Memory
@@ -469,12 +502,17 @@ bool render_session_prepare(render_session *session, const render_request *reque
 bool render_session_open(render_session *session, const render_request *request)
 {
     uint32_t camera;
-    if (!render_session_prepare(session, request) || !camera_find(session->scene, request->camera, &camera)) {
+    if (!render_session_prepare(session, request) || !camera_find(session->scene, request->camera, &camera) ||
+        !animation_check(session->scene, request->animation)) {
         return false;
     }
     progress_show("upload %s", request->scene);
     session->renderer = renderer_create(session->gpu, session->scene, &request->settings);
-    if (!session->renderer || !camera_place(session->renderer, request, camera)) {
+    if (!session->renderer) {
+        return false;
+    }
+    animations_play(session->renderer, request);
+    if (!camera_place(session->renderer, request, camera)) {
         return false;
     }
     if (request->has_sun) {

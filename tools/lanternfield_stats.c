@@ -219,7 +219,7 @@ static void color_add(double sum[3], const float color[3])
 
 static void vpls_to_json(cJSON *root, cJSON *flux, renderer *r)
 {
-    const uint32_t slots = renderer_vpl_slots(r);
+    const uint32_t slots = renderer_slots(r);
     vpl *const vpls = buffer_items_read(r, "vpls|-", slots, sizeof(vpl));
     uint32_t occupied = 0;
     double sum[3] = {0};

@@ -1,6 +1,7 @@
-// make_scenes DIR: writes the scenes of our own as binary glTF: cornell.glb, two_rooms.glb, door.glb and atrium.glb.
+// make_scenes DIR: writes the scenes of our own as binary glTF, by the table at the end.
 // Metres, candela and lux; the same program gives the same bytes.
 #include "tools/make_scenes_atrium.h"
+#include "tools/make_scenes_lanterns.h"
 
 #include <errno.h>
 #include <math.h>
@@ -149,6 +150,15 @@ static bool scene_write(const char *folder, const char *name, void (*build)(gltf
     return written;
 }
 
+static const struct {
+    const char *name;
+    void (*build)(gltf_file *file);
+} scenes[] = {
+    {"cornell.glb", cornell_build}, {"two_rooms.glb", two_rooms_build}, {"door.glb", door_build},
+    {"atrium.glb", atrium_build},   {"lanterns.glb", lanterns_build},   {"lanterns_500.glb", lanterns_500_build},
+    {"dancers.glb", dancers_build},
+};
+
 int main(int argc, char **argv)
 {
     if (argc != 2) {
@@ -160,8 +170,8 @@ int main(int argc, char **argv)
         log_error("%s: cannot make the folder: %s", folder, strerror(errno));
         return 1;
     }
-    const bool written = scene_write(folder, "cornell.glb", cornell_build) &&
-                         scene_write(folder, "two_rooms.glb", two_rooms_build) &&
-                         scene_write(folder, "door.glb", door_build) && scene_write(folder, "atrium.glb", atrium_build);
-    return written ? 0 : 1;
+    for (size_t i = 0; i < countof(scenes); i++)
+        if (!scene_write(folder, scenes[i].name, scenes[i].build))
+            return 1;
+    return 0;
 }

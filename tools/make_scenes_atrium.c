@@ -447,7 +447,7 @@ static void views_add(gltf_file *file)
     gltf_sun_add(file, "sun", (vec3){0.4f, 1, 0.52f}, (vec3){1, 0.93f, 0.82f}, 100);
 }
 
-void atrium_build(gltf_file *file)
+void atrium_add(gltf_file *file, bool clear_court)
 {
     const atrium_materials materials = materials_add(file);
     shell_add(file, &materials);
@@ -458,6 +458,11 @@ void atrium_build(gltf_file *file)
     balustrade_add(file, &materials);
     dentils_add(file, &materials);
     openings_add(file, &materials);
-    atrium_furnish(file, &materials);
+    atrium_furnish(file, &materials, clear_court);
+}
+
+void atrium_build(gltf_file *file)
+{
+    atrium_add(file, false);
     views_add(file);
 }

@@ -4,6 +4,10 @@
 #include "tools/make_scenes_gltf.h"
 
 void atrium_build(gltf_file *file);
+// Building and furniture without sun and cameras. A clear court has no fountain, benches and palms in the way.
+void atrium_add(gltf_file *file, bool clear_court);
+// Dancers in its cleared court under a moving sun (make_scenes_dancers.c).
+void dancers_build(gltf_file *file);
 
 // ---- Shared by the building and its furniture.
 
@@ -41,4 +45,4 @@ atrium_place atrium_side_place(atrium_side side, float along, float outward, flo
 gltf_mesh atrium_mesh_add(gltf_file *file, const char *name, mesh *mesh, gltf_material material);
 
 // Cloth, plants, pots, fountain and benches (make_scenes_furniture.c).
-void atrium_furnish(gltf_file *file, const atrium_materials *materials);
+void atrium_furnish(gltf_file *file, const atrium_materials *materials, bool clear_court);

@@ -208,7 +208,13 @@ static gltf_mesh plant_add(gltf_file *file, const char *name, const plant *plant
     return atrium_mesh_add(file, name, &foliage, material);
 }
 
-static void plants_add(gltf_file *file, const atrium_materials *materials)
+// Where people would dance.
+static bool in_court_middle(vec3 position)
+{
+    return position.y < atrium_lower_floor && fabsf(position.x) < 5 && fabsf(position.z) < 3.6f;
+}
+
+static void plants_add(gltf_file *file, const atrium_materials *materials, bool clear_court)
 {
     static const vec2 pot_profile[] = {{0.2f, -0.01f},  {0.22f, 0.02f},   {0.3f, 0.3f},   {0.31f, 0.4f},
                                        {0.305f, 0.43f}, {0.355f, 0.435f}, {0.37f, 0.46f}, {0.365f, 0.52f},
@@ -264,6 +270,8 @@ static void plants_add(gltf_file *file, const atrium_materials *materials)
     };
     for (size_t i = 0; i < countof(table); i++) {
         const vec3 foot = table[i].position;
+        if (clear_court && in_court_middle(foot))
+            continue;
         gltf_node_add(file, pot_mesh, foot, table[i].yaw);
         gltf_node_add(file, soil_mesh, foot, table[i].yaw);
         gltf_node_add(file, kinds[table[i].kind], vec3_add(foot, (vec3){0, 0.46f, 0}), table[i].yaw);
@@ -296,7 +304,7 @@ static void fountain_add(gltf_file *file, const atrium_materials *materials)
     gltf_node_add(file, atrium_mesh_add(file, "water", &water, materials->water), (vec3){0}, 0);
 }
 
-static void benches_add(gltf_file *file, const atrium_materials *materials)
+static void benches_add(gltf_file *file, const atrium_materials *materials, bool clear_court)
 {
     mesh legs = {0}, seat = {.repeat = 1};
     const vec2 leg[] = {{0.02f, -0.01f}, {0.02f, 0.06f}, {0, 0.09f}, {0, 0.34f}, {0.02f, 0.37f}, {0.02f, 0.42f}};
@@ -323,17 +331,20 @@ static void benches_add(gltf_file *file, const atrium_materials *materials)
         atrium_side_place(SIDE_SOUTH, 1.3f, 2.2f, lower),
     };
     for (size_t i = 0; i < countof(places); i++) {
+        if (clear_court && in_court_middle(places[i].position))
+            continue;
         node_add(file, legs_mesh, places[i]);
         node_add(file, seat_mesh, places[i]);
     }
 }
 
-void atrium_furnish(gltf_file *file, const atrium_materials *materials)
+void atrium_furnish(gltf_file *file, const atrium_materials *materials, bool clear_court)
 {
     swags_add(file, materials);
     hangings_add(file, materials);
     curtains_add(file, materials);
-    plants_add(file, materials);
-    fountain_add(file, materials);
-    benches_add(file, materials);
+    plants_add(file, materials, clear_court);
+    if (!clear_court)
+        fountain_add(file, materials);
+    benches_add(file, materials, clear_court);
 }

@@ -1,5 +1,6 @@
 // Procedural textures that tile; see the header.
 #include "tools/make_scenes_texture.h"
+#include "tools/make_scenes_figure.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -146,6 +147,20 @@ texel texture_paving(float u, float v)
     };
 }
 
+texel texture_cobbles(float u, float v)
+{
+    const float bend = 0.012f * fractal_noise(u, v, 6, 3, 55);
+    const masonry_place place = masonry(u + bend, v - bend, 8, 8, 0.5f, 1.2f, 56);
+    const float clouds = fractal_noise(u, v, 8, 5, 57), grain = fractal_noise(u, v, 64, 3, 58);
+    const float sett = smooth(0.006f, 0.016f, place.edge + 0.003f * grain);
+    const vec3 warm = {0.30f, 0.26f, 0.21f}, grey = {0.21f, 0.21f, 0.22f}, joint = {0.08f, 0.07f, 0.06f};
+    const vec3 stone = vec3_scale(mix3(grey, warm, place.tone), 1 + 0.2f * clouds + 0.15f * grain);
+    return (texel){
+        .albedo = mix3(joint, stone, sett),
+        .height = 0.02f * smooth(0, 0.06f, place.edge) + 0.002f * grain + 0.004f * place.tone,
+    };
+}
+
 texel texture_marble(float u, float v)
 {
     const masonry_place place = masonry(u, v, 2, 2, 0, 1.2f, 61);
@@ -205,6 +220,31 @@ texel texture_cloth_blue(float u, float v)
     return cloth(u, v, (vec3){0.06f, 0.13f, 0.40f}, (vec3){0.55f, 0.50f, 0.38f}, 85);
 }
 
+// Broad stripes along v of a coarse weave.
+static texel awning(float u, float v, vec3 dye, uint32_t seed)
+{
+    const vec3 linen = {0.70f, 0.63f, 0.50f};
+    const float weave = noise(u, v, 128, 16, seed) + noise(u, v, 16, 128, seed + 1) - 1;
+    const float faded = fractal_noise(u, v, 3, 4, seed + 2), stripe = fract(4 * u);
+    const vec3 color = stripe < 0.5f ? dye : linen;
+    return (texel){.albedo = vec3_scale(color, 0.95f + 0.12f * weave + 0.12f * faded)};
+}
+
+texel texture_awning_red(float u, float v)
+{
+    return awning(u, v, (vec3){0.52f, 0.07f, 0.05f}, 101);
+}
+
+texel texture_awning_blue(float u, float v)
+{
+    return awning(u, v, (vec3){0.07f, 0.15f, 0.36f}, 104);
+}
+
+texel texture_awning_ochre(float u, float v)
+{
+    return awning(u, v, (vec3){0.60f, 0.36f, 0.08f}, 107);
+}
+
 // Leaflets on both sides of a rib, longest at a third of the way; x in [-1, 1] across, y in [0, 1] from stalk to tip.
 static texel frond(float x, float y)
 {
@@ -239,6 +279,166 @@ texel texture_leaves(float u, float v)
 {
     const float half = fract(2 * u) * 2 - 1;
     return u < 0.5f ? frond(half, 1 - v) : broad_leaf(half, 1 - v);
+}
+
+// ---- Costumes. Places are metres of the figure at rest, seen from in front.
+
+typedef struct costume {
+    vec3 skin, hair, shirt, over_shirt, lower, trim, shoes;
+    bool waistcoat, braces, skirt;
+    uint32_t seed;
+} costume;
+
+// 1 within `half` of zero, with an edge of `blur`.
+static float band(float x, float half, float blur)
+{
+    return 1 - smooth(half - blur / 2, half + blur / 2, fabsf(x));
+}
+
+static vec3 face_paint(const costume *costume, float x, float y)
+{
+    const float side = fabsf(x);
+    const float blush = expf(-((side - 0.05f) * (side - 0.05f) + (y - 1.61f) * (y - 1.61f)) / 0.0006f);
+    vec3 paint =
+        mix3(costume->skin, (vec3){costume->skin.x, 0.6f * costume->skin.y, 0.55f * costume->skin.z}, 0.35f * blush);
+    const float lips = band(y - 1.577f - 0.1f * side, 0.0065f * clamp01(1 - side / 0.03f), 0.004f);
+    paint = mix3(paint, (vec3){0.9f * costume->skin.x, 0.45f * costume->skin.y, 0.42f * costume->skin.z},
+                 lips * (side < 0.03f));
+    const float ex = (side - 0.035f) / 0.0165f, ey = (y - 1.656f) / 0.0075f;
+    const float white = 1 - smooth(0.75f, 1.1f, ex * ex + ey * ey);
+    const float iris = 1 - smooth(0.0055f, 0.0075f, hypotf(side - 0.034f, y - 1.657f));
+    const float lash = band(y - 1.6665f + 8 * (side - 0.035f) * (side - 0.035f), 0.0022f, 0.003f) *
+                       band(side - 0.036f, 0.019f, 0.004f);
+    const float brow =
+        band(y - 1.682f + 6 * (side - 0.04f) * (side - 0.04f), 0.0035f, 0.004f) * band(side - 0.04f, 0.022f, 0.008f);
+    paint = mix3(paint, (vec3){0.72f, 0.70f, 0.67f}, white);
+    paint = mix3(paint, (vec3){0.05f, 0.035f, 0.025f}, fmaxf(white * iris, lash));
+    paint = mix3(paint, vec3_scale(costume->hair, 0.8f), 0.85f * brow);
+    // Hair on the forehead and at the temples.
+    const float hairline = fmaxf(smooth(1.7f, 1.712f, y + 1.5f * x * x), smooth(0.072f, 0.078f, side) * (y > 1.62f));
+    return mix3(paint, costume->hair, hairline);
+}
+
+static vec3 shirt_paint(const costume *costume, float x, float y)
+{
+    const float side = fabsf(x);
+    const float placket = band(x, 0.012f, 0.004f), cuff = smooth(0.555f, 0.56f, side);
+    vec3 paint = mix3(costume->shirt, vec3_scale(costume->shirt, 0.8f), placket);
+    paint = mix3(paint, costume->trim, cuff);
+    if (costume->waistcoat) {
+        const float half = mix(0.185f, 0.125f, smooth(1.26f, 1.32f, y));
+        const float cloth = (1 - smooth(half, half + 0.005f, side)) * (1 - smooth(1.4f, 1.405f, y));
+        const float button = band(x, 0.007f, 0.003f) * band(fract(y / 0.06f) * 0.06f - 0.03f, 0.007f, 0.003f);
+        paint = mix3(paint, mix3(costume->over_shirt, costume->trim, button), cloth);
+    }
+    if (costume->braces)
+        paint = mix3(paint, costume->over_shirt, band(side - 0.085f, 0.018f, 0.004f));
+    if (costume->skirt) // a bodice
+        paint = mix3(paint, costume->over_shirt, (1 - smooth(0.185f, 0.19f, side)) * (1 - smooth(1.3f, 1.305f, y)));
+    return paint;
+}
+
+static vec3 lower_paint(const costume *costume, float x, float y)
+{
+    const float belt = smooth(1.045f, 1.05f, y);
+    if (!costume->skirt)
+        return mix3(costume->lower, mix3(costume->shoes, costume->trim, band(x, 0.02f, 0.004f)), belt);
+    const float ribbons = fmaxf(band(y - 0.47f, 0.012f, 0.004f), band(y - 0.53f, 0.025f, 0.004f));
+    return mix3(costume->lower, costume->trim, fmaxf(ribbons, belt));
+}
+
+static texel costume_texel(const costume *costume, float u, float v)
+{
+    const int column = wrap((int)floorf(4 * u), 4), row = wrap((int)floorf(2 * v), 2);
+    const figure_region region = (figure_region)(4 * row + column);
+    if (region >= REGION_COUNT)
+        return (texel){.albedo = costume->lower};
+    const figure_rectangle cell = figure_cell(region);
+    const float x = mix(cell.left, cell.right, fract(4 * u)), y = mix(cell.top, cell.bottom, fract(2 * v));
+    vec3 paint = {0};
+    float grain = 0.06f;
+    switch (region) {
+    case REGION_SKIN:
+        paint = costume->skirt && y < 0.24f ? (vec3){0.7f, 0.68f, 0.64f} : costume->skin; // socks
+        break;
+    case REGION_FACE:
+        paint = face_paint(costume, x, y);
+        break;
+    case REGION_HAIR:
+        paint = costume->hair;
+        grain = 0.5f;
+        break;
+    case REGION_SHIRT:
+        paint = shirt_paint(costume, x, y);
+        grain = 0.15f;
+        break;
+    case REGION_LOWER:
+        paint = lower_paint(costume, x, y);
+        grain = 0.2f;
+        break;
+    case REGION_SHOES:
+        paint = costume->shoes;
+        break;
+    case REGION_COUNT:
+        break;
+    }
+    return (texel){.albedo = vec3_scale(paint, 1 + grain * fractal_noise(u, v, 64, 3, costume->seed))};
+}
+
+texel texture_costume_waistcoat(float u, float v)
+{
+    static const costume costume = {.skin = {0.58f, 0.36f, 0.25f},
+                                    .hair = {0.06f, 0.04f, 0.03f},
+                                    .shirt = {0.72f, 0.70f, 0.65f},
+                                    .over_shirt = {0.10f, 0.16f, 0.09f},
+                                    .lower = {0.07f, 0.065f, 0.06f},
+                                    .trim = {0.62f, 0.45f, 0.16f},
+                                    .shoes = {0.05f, 0.03f, 0.02f},
+                                    .waistcoat = true,
+                                    .seed = 101};
+    return costume_texel(&costume, u, v);
+}
+
+texel texture_costume_braces(float u, float v)
+{
+    static const costume costume = {.skin = {0.30f, 0.16f, 0.10f},
+                                    .hair = {0.02f, 0.016f, 0.013f},
+                                    .shirt = {0.30f, 0.42f, 0.55f},
+                                    .over_shirt = {0.16f, 0.08f, 0.04f},
+                                    .lower = {0.30f, 0.23f, 0.15f},
+                                    .trim = {0.66f, 0.63f, 0.57f},
+                                    .shoes = {0.12f, 0.06f, 0.03f},
+                                    .braces = true,
+                                    .seed = 103};
+    return costume_texel(&costume, u, v);
+}
+
+texel texture_costume_red_skirt(float u, float v)
+{
+    static const costume costume = {.skin = {0.64f, 0.42f, 0.31f},
+                                    .hair = {0.22f, 0.10f, 0.04f},
+                                    .shirt = {0.74f, 0.72f, 0.67f},
+                                    .over_shirt = {0.08f, 0.06f, 0.07f},
+                                    .lower = {0.52f, 0.06f, 0.05f},
+                                    .trim = {0.70f, 0.60f, 0.38f},
+                                    .shoes = {0.06f, 0.03f, 0.025f},
+                                    .skirt = true,
+                                    .seed = 105};
+    return costume_texel(&costume, u, v);
+}
+
+texel texture_costume_blue_skirt(float u, float v)
+{
+    static const costume costume = {.skin = {0.46f, 0.27f, 0.17f},
+                                    .hair = {0.035f, 0.025f, 0.02f},
+                                    .shirt = {0.72f, 0.55f, 0.20f},
+                                    .over_shirt = {0.36f, 0.10f, 0.08f},
+                                    .lower = {0.06f, 0.22f, 0.33f},
+                                    .trim = {0.72f, 0.68f, 0.58f},
+                                    .shoes = {0.10f, 0.05f, 0.03f},
+                                    .skirt = true,
+                                    .seed = 107};
+    return costume_texel(&costume, u, v);
 }
 
 static uint8_t srgb_byte(float linear)

@@ -23,6 +23,7 @@ libstb-dev|PNG and JPEG|
 libtinyexr-dev|OpenEXR images|
 libcjson-dev|statistics and suites|
 libembree-dev|rays on the CPU|
+libosd-dev|subdivision surfaces|
 gnuplot-nox|charts|
 ffmpeg|movies, which lanternfield play makes|
 '
