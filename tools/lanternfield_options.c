@@ -110,7 +110,7 @@ static bool time_read(render_request *request, const char *value, setting_error 
     request->has_time = true;
     const bool is_number = numbers_read(value, &request->time, 1);
     error->out_of_range = is_number;
-    return (is_number && request->time >= 0) || refuse(error, "--time", "a number of seconds, 0 or more", value);
+    return (is_number && request->time >= 0) || option_refuse(error, "--time", "a number of seconds, 0 or more", value);
 }
 
 static bool stats_read(render_request *request, const char *value, setting_error *error)
