@@ -176,7 +176,8 @@ playback_light_state playback_light_at(const playback *script, const playback_li
     curve_or(&light->direction, time, state.direction);
     double square = 0;
     for (int k = 0; k < 3; k++) {
-        state.color[k] = fmaxf(state.color[k], 0) * fmaxf(intensity, 0);
+        // At most what a scene may have.
+        state.color[k] = fminf(fmaxf(state.color[k], 0) * fmaxf(intensity, 0), 1e30f);
         square += (double)state.direction[k] * (double)state.direction[k];
     }
     for (int k = 0; k < 3; k++) {

@@ -12,6 +12,7 @@
 
 enum { FRAMES_MAX = 1000000 };
 static const double pi = 3.14159265358979323846;
+static const double number_max = 1e9; // where nothing else is said: its square is far from a float's end
 
 typedef struct reader {
     playback *script;
@@ -142,14 +143,13 @@ static bool list_read(const reader *r, const cJSON *json, const key_info *key, v
 static bool number_take(const reader *r, const cJSON *json, const key_info *key, const char *name, double *value)
 {
     const bool any = key->min == 0 && key->max == 0;
-    const bool ok = cJSON_IsNumber(json) && isfinite(json->valuedouble) && fabs(json->valuedouble) < 1e30 &&
-                    (any || (json->valuedouble >= key->min && json->valuedouble <= key->max)) &&
-                    !(key->above_min && json->valuedouble <= key->min);
+    const double min = any ? -number_max : key->min, max = any ? number_max : key->max;
+    const bool ok = cJSON_IsNumber(json) && json->valuedouble >= min && json->valuedouble <= max &&
+                    !(key->above_min && json->valuedouble <= min);
     if (!ok) {
-        const char *const range =
-            any ? "a number"
-                : arena_printf(r->memory, "a number %s %.7g and at most %.7g",
-                               key->above_min ? "greater than" : "of at least", key->min, key->max);
+        const char *const range = any ? "a number"
+                                      : arena_printf(r->memory, "a number %s %.7g and at most %.7g",
+                                                     key->above_min ? "greater than" : "of at least", min, max);
         return refuse_value(r, json, name, range);
     }
     *value = json->valuedouble;
@@ -544,7 +544,7 @@ static bool pose_read(const char *path, uint32_t line, char *text, uint32_t *num
     for (char *word = strtok_r(text, " \t\r", &save); word; word = strtok_r(NULL, " \t\r", &save)) {
         char *end;
         const double value = strtod(word, &end);
-        if (*end || !isfinite(value) || fabs(value) > 1e30 || count == 8) {
+        if (*end || !(fabs(value) <= number_max) || count == 8) {
             return walk_refuse(path, line, "7 or 8 numbers: time, position, target and maybe yfov");
         }
         values[count++] = value;
@@ -976,6 +976,30 @@ static bool cameras_finish(const reader *r)
     return true;
 }
 
+// Every frame must have a picture, also where a spline swings beyond its keys.
+static bool poses_check(const reader *r)
+{
+    const playback *const script = r->script;
+    for (uint32_t frame = 0; frame < script->frame_count; frame++) {
+        const playback_camera *const camera = playback_camera_of(script, frame);
+        if (!camera || camera->name) {
+            continue;
+        }
+        const playback_pose pose = playback_pose_at(script, camera, frame);
+        bool seen = false;
+        for (int k = 0; k < 3; k++) {
+            seen = seen || pose.position[k] != pose.target[k];
+        }
+        if (!seen || pose.yfov < 0 || (double)pose.yfov >= pi) {
+            log_error("%s:%u: a camera: expected %s in each frame, got %g in frame %u", script->path, camera->line,
+                      seen ? "a yfov greater than 0 and less than pi" : "a position away from the target",
+                      seen ? (double)pose.yfov : 0, frame);
+            return false;
+        }
+    }
+    return true;
+}
+
 static bool light_names_check(const reader *r)
 {
     const playback *const script = r->script;
@@ -1028,7 +1052,7 @@ static bool script_finish(const reader *r, const file_script *from)
         script->outputs = &png;
         script->output_count = 1;
     }
-    return cameras_finish(r) && light_names_check(r) && events_finish(r, from);
+    return cameras_finish(r) && poses_check(r) && light_names_check(r) && events_finish(r, from);
 }
 
 playback *playback_load(const char *path)

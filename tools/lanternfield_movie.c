@@ -52,6 +52,10 @@ static int process_start(process *p, char *const *words)
     close(errors[1]);
     p->input = input[1];
     p->errors = errors[0];
+    if (error != 0) {
+        close(p->input);
+        close(p->errors);
+    }
     return error;
 }
 
@@ -86,10 +90,6 @@ bool movie_check(const char *path)
         return false;
     }
     const int error = process_start(&p, (char *[]){"ffmpeg", "-version", NULL});
-    if (error != 0) {
-        close(p.input);
-        close(p.errors);
-    }
     if (error != 0 || !process_end(&p, line, sizeof(line))) {
         log_error("cannot write \"%s\": movies need the program ffmpeg, and it does not run: %s", path,
                   error != 0 ? strerror(error) : line);

@@ -137,8 +137,10 @@ static void help_print(FILE *out)
         "refused. The frames of a movie are kept in MOVIE.frames until it is complete, and it is made from all of\n"
         "them at the end; a run that was killed goes on from them with --resume. --stats counts lights in every\n"
         "frame, which its times include.\n"
-        "\n--frames, --target-ms and --target-error are refused. Ctrl-C ends after the frame, with what there is;\n"
-        "a movie is then made of the frames so far. Exit codes: 0 done, 1 failed (also a value that cannot be\n"
+        "\n--target-ms and --target-error follow what is measured, so that two runs differ; they are refused without\n"
+        "--record, which writes a script that gives the bytes of this run whenever it is played with the same other\n"
+        "options. Ctrl-C ends after the frame, with what there is; a movie is then made of the frames so far. Exit "
+        "codes: 0 done, 1 failed (also a value that cannot be\n"
         "used), 2 wrong usage, 130 interrupted.\n",
         names);
 }
