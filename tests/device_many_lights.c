@@ -169,13 +169,12 @@ static comparison compare(const float *image, const float *reference, size_t pix
 static lights scattered;
 
 // With levels so large that every light is near, each is used as itself.
-static void check_level_0(uint32_t lighting, uint32_t interleave)
+static void check_level_0(uint32_t lighting)
 {
     render_settings s = floor_settings();
     s.levels = 1;
     s.alpha = 4;
     s.lighting = lighting;
-    s.interleave = interleave;
     renderer *r = floor_create(&s);
     lights_scatter(r, &scattered, 400, 0.3f, 1.5f);
     float *image = frame_image(r, "indirect");
@@ -197,8 +196,8 @@ static void check_level_0(uint32_t lighting, uint32_t interleave)
 
 TEST(lights_over_a_floor_sum_up_as_they_should)
 {
-    check_level_0(LIGHTING_GATHER, 1);
-    check_level_0(LIGHTING_VOLUMES, 1);
+    check_level_0(LIGHTING_GATHER);
+    check_level_0(LIGHTING_VOLUMES);
 }
 
 static comparison hierarchy_against_all(render_settings s, float low, float high, uint32_t count)
@@ -232,6 +231,18 @@ TEST(the_hierarchy_of_lights_converges_to_their_sum)
         CHECK(c.error < rows[i].error);
         CHECK_NEAR(c.energy, 1, rows[i].energy);
     }
+}
+
+// Each tile has a quarter of the lights, times four.
+TEST(interleaved_tiles_share_the_lights_out)
+{
+    render_settings s = floor_settings();
+    s.alpha = 2;
+    const comparison whole = hierarchy_against_all(s, 0.2f, 3, 4000);
+    s.interleave = 2;
+    const comparison dealt = hierarchy_against_all(s, 0.2f, 3, 4000);
+    printf("  energy in tiles %.4f, without %.4f\n", dealt.energy, whole.energy);
+    CHECK_NEAR(dealt.energy / whole.energy, 1, 0.02);
 }
 
 // A cell of lights radiates evenly by every model, for its normals have no moments.
@@ -695,6 +706,7 @@ int main(int argc, char **argv)
         return lanterns_print((uint32_t)atoi(argv[2]), (uint32_t)atoi(argv[3]));
     RUN(lights_over_a_floor_sum_up_as_they_should);
     RUN(the_hierarchy_of_lights_converges_to_their_sum);
+    RUN(interleaved_tiles_share_the_lights_out);
     RUN(emission_models_agree_on_lights);
     RUN(a_light_that_touches_a_pixel_neither_glares_nor_breaks);
     RUN(path_tracing_and_the_sum_over_all_agree);
