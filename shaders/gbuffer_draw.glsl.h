@@ -13,6 +13,6 @@ layout(constant_id = 3) const bool NORMAL_TEXTURE = true;
 layout(constant_id = 4) const bool VERTEX_COLORS = true;
 layout(constant_id = 5) const bool MOVES = true; // the camera or the instance, since the last frame
 
-layout(push_constant, scalar) uniform draw_block { uint instance; uint primitive; } draw;
+layout(push_constant, scalar) uniform draw_block { uint instance; uint primitive; uint identity; } draw;
 
 #endif
