@@ -467,6 +467,16 @@ void frame_graph_cull_set(frame_graph *graph, bool enabled)
     graph->culling_off = !enabled;
 }
 
+bool frame_graph_has_history(const frame_graph *graph, const char *name)
+{
+    for (size_t h = 0; h < graph->history_count; h++) {
+        if (strcmp(graph->histories[h].name, name) == 0) {
+            return graph->histories[h].written;
+        }
+    }
+    return false;
+}
+
 void frame_graph_history_drop(frame_graph *graph)
 {
     for (size_t h = 0; h < graph->history_count; h++) {

@@ -63,6 +63,8 @@ void frame_graph_read_previous(frame_graph_pass *pass, const char *name, frame_g
 void frame_graph_export(frame_graph *graph, const char *name, frame_graph_access after);
 void frame_graph_cull_set(frame_graph *graph, bool enabled); // default: on
 void frame_graph_history_drop(frame_graph *graph); // a cut: next frame's history is invalid
+// Whether the last frame left contents of `name` for frame_graph_read_previous. Between frames and while declaring.
+bool frame_graph_has_history(const frame_graph *graph, const char *name);
 
 static inline frame_graph_resource_desc frame_graph_image_of(VkFormat format, uint32_t width, uint32_t height)
 {

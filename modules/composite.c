@@ -51,14 +51,18 @@ static void composite_declare(renderer *r, composite_state *state, const char *n
         .name = name, .kind = FRAME_GRAPH_COMPUTE, .execute = composite_run, .user = state};
     frame_graph_pass *pass = frame_graph_pass_add(r->graph, &desc);
     const bool direct = parts & PART_DIRECT, indirect = parts & PART_INDIRECT;
+    const bool shadows = parts & PART_INDIRECT_SHADOWS;
+    const bool steadied = shadows && renderer_has_shadows(r) && r->settings.taa && r->settings.taa_target == TAA_LIGHT;
     const char *const uses[] = {
         "albedo",
         parts & PART_EMISSION && has_emission(r) ? "emission" : "black",
         direct ? "direct|black" : "black",
         direct ? "direct_analytic|direct_u_filtered|direct_u|black" : "black",
         direct ? "direct_ratio|direct_ratio_now|white" : "white",
-        indirect ? "indirect_gathered|indirect|black" : "black",
-        parts & PART_INDIRECT_SHADOWS ? "shadow_ratio|shadow_ratio_now|white" : "white",
+        steadied   ? "shadow_steadied"
+        : indirect ? "indirect_gathered|indirect|black"
+                   : "black",
+        shadows && !steadied ? "shadow_ratio|shadow_ratio_now|white" : "white",
     };
     for (size_t i = 0; i < countof(uses); i++)
         frame_graph_read(pass, uses[i], ACCESS_SAMPLED);

@@ -241,7 +241,7 @@ static void gbuffer_draw(const frame_graph_context *context, void *user)
         if (i == 0 || d->needs != d[-1].needs)
             frame_graph_bind(context, state->pipelines[d->needs]);
         const material *m = &r->scene->materials[r->scene->primitives[d->primitive].material];
-        const uint32_t push[2] = {d->instance, d->primitive};
+        const uint32_t push[] = {d->instance, d->primitive, world_identity(r->gpu_world->order[d->instance].entity)};
         v.instance = &r->gpu_world->instance_data[d->instance];
         eye_of(v.instance, v.eye, v.mesh_eye);
         gpu_cull_set(context->commands, cull_of(v.instance, m));

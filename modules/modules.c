@@ -19,6 +19,7 @@ bool modules_init(renderer *r)
         light_gather_init, // unshadowed indirect light from the hierarchy, and the shadow samples
         light_volume_init, // the same by rasterising, as the paper does
         shadow_init, // shadows of the samples
+        shadow_again_init, // some of the last frame's samples, to know where the history holds
         interleave_init, // gathers interleaved tiles
         svgf_init, // filters the shadowed and unshadowed estimates alike
         taa_init, // steadies their ratio over time

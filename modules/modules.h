@@ -20,6 +20,7 @@ bool direct_light_init(renderer *r);
 bool light_gather_init(renderer *r);
 bool light_volume_init(renderer *r);
 bool shadow_init(renderer *r);
+bool shadow_again_init(renderer *r);
 bool interleave_init(renderer *r);
 bool svgf_init(renderer *r);
 bool taa_init(renderer *r);

@@ -130,6 +130,26 @@ static void previous_constants(frame_constants *c, const frame_constants *last)
     memcpy(c->previous_up, last->up, sizeof c->previous_up);
 }
 
+// ---- What stays as it is
+
+// Whether nothing differs from the last frame but the random numbers.
+static bool frame_is_still(const renderer *r)
+{
+    const frame_constants *c = &r->constants;
+    const world_changes *changes = &r->gpu_world->changes;
+    return r->frame > 0 && frame_graph_has_history(r->graph, "depth") && !changes->bounds && !changes->sources &&
+           changes->box_count == 0 && memcmp(c->view_projection, c->previous_view_projection, 64) == 0 &&
+           memcmp(c->eye, c->previous_eye, sizeof c->eye) == 0 &&
+           memcmp(&r->settings, &r->last_settings, sizeof r->settings) == 0;
+}
+
+bool renderer_is_settled(const renderer *r)
+{
+    const render_settings *s = &r->settings;
+    const float budget = s->ray_budget > 0 ? fminf(s->ray_budget, 1) : 1;
+    return s->filter && (float)r->still_frames * budget >= STILL_SAMPLES;
+}
+
 // ---- Systems
 
 // After the world's extraction, which has filled in bounds and the numbers of lights.
@@ -147,6 +167,8 @@ static void constants_extract(ecs_world *world, void *user)
     c->seed = r->settings.seed;
     c->auto_exposure = r->settings.auto_exposure;
     c->exposure_ev = r->settings.exposure;
+    r->still_frames = frame_is_still(r) ? r->still_frames + 1 : 0;
+    r->last_settings = r->settings;
     memcpy(gpu_buffer_map(r->gpu, r->gpu_world->frame), c, sizeof *c);
 }
 

@@ -21,7 +21,7 @@
 //   lgh_samples        uvec4[]       choices on the way from each light to one of its VPLs; for the `vpl` end points
 //   depth              D32           near/distance, 0 where nothing was drawn          gbuffer
 //   normals            RGBA16_SNORM  octahedral: xy geometric, zw shading, both towards the viewer
-//   albedo             RGBA16_UNORM  linear; a: 1 where something was drawn
+//   albedo             RGBA16_UNORM  linear; a: which instance it is, see world_identity; 0 where nothing was drawn
 //   emission           RGBA32F       nits
 //   motion             RG16F         pixels from this frame's position to last frame's
 //   direct             RGBA32F       light of the punctual lights that are shadowed one by one   direct_light
@@ -42,6 +42,8 @@
 //   X_u_filtered, X_s_filtered       for X = shadow, direct; made when somebody reads them   svgf
 //   X_ratio_now        RGBA16F       S / U in [0,1]; a: standard deviation left        svgf; taa where unfiltered
 //   X_ratio            RGBA16F       the same after TAA, where it is on; a: frames     taa
+//   shadow_steadied    RGBA32F       with --taa light, in place of shadow_ratio: light after shadows and TAA; a: frames
+//   shadow_records, shadow_limit     samples to trace again: see modules/shadow_again.h              shadow_again
 //   radiance           RGBA32F       nits                    composite; progressive for the other methods
 //   aov_direct, aov_indirect  RGBA32F  their parts of `radiance`, when exported, lgh alone  composite
 //   sums_before, sums  vec4[2][pixels]  the references' light before and after this frame; see progressive.h
@@ -95,6 +97,8 @@ typedef struct renderer {
     struct animation_state *animation; // modules/animation_system.c
     double time; // seconds, of the next frame, by the clock of its animations; may be changed between frames
     uint32_t frame; // number of frames rendered so far
+    uint32_t still_frames; // how many frames in a row, up to this one, show what the frame before showed
+    render_settings last_settings; // the last frame's
     double milliseconds; // that the last frame took, by the clock
     bool failed; // in the current frame; systems set it after logging why
 } renderer;
@@ -132,5 +136,9 @@ uint32_t renderer_vpl_slots(const renderer *r); // settings' vpls, or ir_vpls
 uint32_t renderer_light_slots(const renderer *r);
 uint32_t renderer_slots(const renderer *r); // both
 bool renderer_has_shadows(const renderer *r); // indirect light with shadow samples
+// The picture has been still for so long that its history is full: no samples are taken any more, and each frame is the
+// one before to the bit, but for TAA. STILL_SAMPLES a pixel are behind it.
+enum { STILL_SAMPLES = 64 };
+bool renderer_is_settled(const renderer *r);
 // b in metres: no light's singularity is closer than this.
 float renderer_singularity(const renderer *r);

@@ -41,6 +41,7 @@ render_settings render_settings_default(void)
         .sample_s1 = true,
         .filter = true,
         .taa = true,
+        .taa_target = TAA_RATIO,
         .singularity = 0.003f,
         .only = ONLY_ALL,
         .subdivision_max = 3,
@@ -123,6 +124,18 @@ static void float_print(float value, char text[32])
     }
 }
 
+// One of NULL-terminated names, by its place.
+static bool enum_read(const char *text, const char *const *names, uint32_t *value)
+{
+    for (uint32_t i = 0; names[i]; i++) {
+        if (strcmp(names[i], text) == 0) {
+            *value = i;
+            return true;
+        }
+    }
+    return false;
+}
+
 // ---- Settings with a form of their own
 
 static bool size_read(render_settings *settings, const char *text, bool *out_of_range)
@@ -200,6 +213,25 @@ static void exposure_print(const render_settings *settings, char text[32])
     if (settings->auto_exposure) {
         strcpy(text, "auto");
     }
+}
+
+static const char *const taa_names[] = {[TAA_RATIO] = "ratio", [TAA_LIGHT] = "light", "off", NULL};
+
+static bool taa_read(render_settings *settings, const char *text, bool *out_of_range)
+{
+    (void)out_of_range;
+    uint32_t value;
+    if (!enum_read(text, taa_names, &value)) {
+        return false;
+    }
+    settings->taa = value <= TAA_LIGHT;
+    settings->taa_target = settings->taa ? value : TAA_RATIO;
+    return true;
+}
+
+static void taa_print(const render_settings *settings, char text[32])
+{
+    strcpy(text, settings->taa ? taa_names[settings->taa_target] : "off");
 }
 
 // ---- The table
@@ -388,7 +420,14 @@ static const setting_info table[] = {
      .help = "b in 1 / (d^2 + b^2) as a fraction of the scene's radius, 0 to 1"},
     {.name = "only", .type = SETTING_ENUM, FIELD(only), .values = only_names, .help = "render one part of the light"},
     {.name = "no-filter", .type = SETTING_FALSE, FIELD(filter), .help = "leave the shadows unfiltered"},
-    {.name = "no-taa", .type = SETTING_FALSE, FIELD(taa), .help = "no temporal anti-aliasing of the shadows"},
+    {.name = "taa",
+     .type = SETTING_SPECIAL,
+     .read = taa_read,
+     .print = taa_print,
+     .expected = "one of ratio, light, off",
+     .value_name = "ratio|light|off",
+     .help = "temporal anti-aliasing of the shadows, or of the shadowed indirect light, which lags"},
+    {.name = "no-taa", .type = SETTING_FALSE, FIELD(taa), .help = "the same as --taa off"},
     {.name = "subdivision-max",
      .type = SETTING_UINT,
      FIELD(subdivision_max),
@@ -467,17 +506,6 @@ const setting_info *settings_find(const char *name)
 }
 
 // ---- Reading and printing through the table
-
-static bool enum_read(const char *text, const char *const *names, uint32_t *value)
-{
-    for (uint32_t i = 0; names[i]; i++) {
-        if (strcmp(names[i], text) == 0) {
-            *value = i;
-            return true;
-        }
-    }
-    return false;
-}
 
 static bool switch_read(const char *text, bool when_on, bool *value)
 {

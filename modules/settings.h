@@ -14,12 +14,14 @@ typedef enum lgh_s1_method { LGH_S1_ORDERED, LGH_S1_ATOMIC } lgh_s1_method;
 typedef enum end_point { END_POINT_CENTRE, END_POINT_JITTER, END_POINT_VPL } end_point;
 typedef enum reservoir_method { RESERVOIRS_EXACT, RESERVOIRS_UNLOCKED } reservoir_method;
 typedef enum blend_method { BLEND_LATE, BLEND_PAPER } blend_method;
+typedef enum taa_target { TAA_RATIO, TAA_LIGHT } taa_target;
 typedef enum sampling_method { SAMPLING_IMPORTANCE, SAMPLING_UNIFORM } sampling_method;
 
 typedef struct render_settings {
     uint32_t width, height; // pixels
     uint32_t method;
-    uint32_t rays; // who traces them; RAYS_AUTO: Embree where the device is a CPU, else query where it can, else pipeline
+    uint32_t
+        rays; // who traces them; RAYS_AUTO: Embree where the device is a CPU, else query where it can, else pipeline
     bool ray_order; // rays are compacted and ordered before a GPU traces them
     float ray_budget; // indirect shadow rays per pixel on average, at most shadow_samples; 0: shadow_samples everywhere
     uint32_t vpls; // slots, 0 to 2,500,000
@@ -43,6 +45,7 @@ typedef struct render_settings {
     bool sample_s1; // S1 (and S0) take part in the shadow sampling
     bool filter;
     bool taa;
+    uint32_t taa_target; // what it steadies of the indirect light: the shadow ratio, or their product
     float singularity; // b as a fraction of the scene's radius: 1 / (d^2 + b^2)
     uint32_t only;
     uint32_t subdivision_max; // finest level of subdivided meshes, 0 to 5; 0: control cages are drawn as they are

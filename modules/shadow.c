@@ -1,7 +1,9 @@
 // Shadows of the reservoirs' samples: makes the pair `shadow_u`, `shadow_s`, and counts the rays in `rays_shadow`. With
 // a ray budget, `shadow_plan` says which pixels have how many, by what the filter knows of them.
+#include "filters.h"
 #include "light_rays.h"
 #include "modules.h"
+#include "shadow_again.h"
 
 #include "lanternfield_renderer_shaders.h"
 
@@ -29,6 +31,7 @@ typedef struct budget_pass {
     gpu_pipeline priority, budget;
     uint32_t width, height, interleave, samples;
     float ray_budget;
+    const char *counter;
 } budget_pass;
 
 static gpu_pipeline pipeline_of(renderer *r, shadow *state, uint32_t variant)
@@ -54,12 +57,19 @@ static void execute(const frame_graph_context *context, void *user)
     gpu_dispatch(context->commands, div_up_u32(pass->width, PIXEL_GROUP_WIDTH), pass->height, 1);
 }
 
+// Once the picture has settled these passes are culled, unless somebody looks at what they make; then they count for
+// nothing.
+static const char *counter_name(const renderer *r)
+{
+    return renderer_is_settled(r) ? "rays_shadow_idle" : "rays_shadow";
+}
+
 // ---- The budget
 
 // Whether the filter has a history; what it keeps is as old as the last of it.
 static bool filter_history_valid(const frame_graph_context *context)
 {
-    return frame_graph_history_valid(context, "depth") && frame_graph_history_valid(context, "shadow_moments");
+    return reprojection_is_valid(context) && frame_graph_history_valid(context, "shadow_moments");
 }
 
 static void priority_execute(const frame_graph_context *context, void *user)
@@ -84,7 +94,7 @@ static void budget_execute(const frame_graph_context *context, void *user)
         .budget = pass->ray_budget,
         .most = (float)pass->samples,
         .history_valid =
-            frame_graph_history_valid(context, "shadow_budget") && frame_graph_history_valid(context, "rays_shadow"),
+            frame_graph_history_valid(context, "shadow_budget") && frame_graph_history_valid(context, pass->counter),
     };
     frame_graph_bind(context, pass->budget);
     gpu_push(context->commands, &push, sizeof push);
@@ -101,16 +111,14 @@ static frame_graph_pass *budget_pass_add(renderer *r, const char *name, budget_p
 
 static void priority_declare(renderer *r, budget_pass *args)
 {
-    static const char *const now[] = {"depth", "normals", "motion", "indirect"};
-    static const char *const before[] = {"depth", "normals", "shadow_u_accumulated", "shadow_s_accumulated",
-                                         "shadow_moments"};
+    static const char *const before[] = {"shadow_u_accumulated", "shadow_s_accumulated", "shadow_moments"};
     const frame_graph_resource_desc header = frame_graph_buffer_of(BUDGET_HEADER_SIZE);
     const frame_graph_resource_desc plan = frame_graph_buffer_of((uint64_t)args->width * args->height * 4);
     frame_graph_pass *p = budget_pass_add(r, "shadow/priority", args, priority_execute);
     frame_graph_create_resource(p, "shadow_priorities", &header, ACCESS_STORAGE_READ_WRITE);
     frame_graph_create_resource(p, "shadow_plan", &plan, ACCESS_STORAGE_WRITE);
-    for (size_t i = 0; i < countof(now); i++)
-        frame_graph_read(p, now[i], ACCESS_SAMPLED);
+    reprojection_declare(p);
+    frame_graph_read(p, "indirect", ACCESS_SAMPLED);
     for (size_t i = 0; i < countof(before); i++)
         frame_graph_read_previous(p, before[i], ACCESS_SAMPLED);
 }
@@ -118,13 +126,13 @@ static void priority_declare(renderer *r, budget_pass *args)
 static void budget_declare(renderer *r, const shadow *state)
 {
     const render_settings *s = &r->settings;
-    budget_pass args = {state->priority, state->budget,     s->width,     s->height,
-                        s->interleave,   s->shadow_samples, s->ray_budget};
+    budget_pass args = {state->priority, state->budget,     s->width,      s->height,
+                        s->interleave,   s->shadow_samples, s->ray_budget, counter_name(r)};
     priority_declare(r, &args);
     frame_graph_pass *p = budget_pass_add(r, "shadow/budget", &args, budget_execute);
     frame_graph_modify(p, "shadow_priorities", "shadow_budget", ACCESS_STORAGE_READ_WRITE);
     frame_graph_read_previous(p, "shadow_budget", ACCESS_STORAGE_READ);
-    frame_graph_read_previous(p, "rays_shadow", ACCESS_STORAGE_READ);
+    frame_graph_read_previous(p, args.counter, ACCESS_STORAGE_READ);
 }
 
 // ---- The rays
@@ -151,6 +159,7 @@ static void declare_rays(renderer *r, shadow_pass args, const light_rays *rays, 
     const bool budget = r->settings.ray_budget > 0; // otherwise something else stands in, and is not read
     frame_graph_read(p, budget ? "shadow_budget" : "lgh_header", ACCESS_STORAGE_READ);
     frame_graph_read(p, budget ? "shadow_plan" : "lgh_header", ACCESS_STORAGE_READ);
+    shadow_again_record(r, p, rays->first == 0);
     if (r->settings.end_point == END_POINT_VPL)
         frame_graph_read(p, "lgh_samples", ACCESS_STORAGE_READ);
 }
@@ -169,11 +178,10 @@ static void shadow_setup(renderer *r, void *state)
     }
     if (budget)
         budget_declare(r, state);
-    const uint32_t variant = (s->lighting == LIGHTING_VOLUMES && s->reservoirs == RESERVOIRS_EXACT ? EXACT : 0) |
-                             (s->sampling == SAMPLING_UNIFORM ? UNIFORM : 0) |
-                             (s->end_point == END_POINT_JITTER ? JITTER : 0) |
-                             (s->end_point == END_POINT_VPL ? VPL : 0) |
-                             (s->blend == BLEND_PAPER ? PAPER_BLEND : 0) | (budget ? BUDGET : 0);
+    const uint32_t variant =
+        (s->lighting == LIGHTING_VOLUMES && s->reservoirs == RESERVOIRS_EXACT ? EXACT : 0) |
+        (s->sampling == SAMPLING_UNIFORM ? UNIFORM : 0) | (s->end_point == END_POINT_JITTER ? JITTER : 0) |
+        (s->end_point == END_POINT_VPL ? VPL : 0) | (s->blend == BLEND_PAPER ? PAPER_BLEND : 0) | (budget ? BUDGET : 0);
     const shadow_pass pass = {
         .pipeline = pipeline_of(r, state, variant),
         .width = s->width,
@@ -182,7 +190,7 @@ static void shadow_setup(renderer *r, void *state)
                  s->ray_budget},
     };
     light_rays rays = light_rays_begin(r, "shadow", "shadow_s", s->shadow_samples);
-    resource_chain counter = resource_chain_counter(r->graph, "shadow/clear", "rays_shadow", rays.batches);
+    resource_chain counter = resource_chain_counter(r->graph, "shadow/clear", counter_name(r), rays.batches);
     resource_chain unshadowed = {.name = "shadow_u", .desc = rays.sum.desc, .length = rays.batches};
     do
         declare_rays(r, pass, &rays, &counter, &unshadowed);

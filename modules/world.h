@@ -78,6 +78,14 @@ typedef struct world_instance {
     uint32_t mesh;
 } world_instance;
 
+// What tells the instances of the picture apart, 1 to WORLD_IDENTITIES: the alpha of `albedo` is identity over
+// WORLD_IDENTITIES. Stays with an entity for its life; far apart entities may share one.
+enum { WORLD_IDENTITIES = 65535 };
+static inline uint32_t world_identity(entity e)
+{
+    return 1 + e.id % WORLD_IDENTITIES;
+}
+
 typedef struct world_gpu {
     component_type node, transform, mesh, light, weights;
     entity *node_entities; // [node_count]: what the scene's nodes were spawned as

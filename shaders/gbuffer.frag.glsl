@@ -103,7 +103,7 @@ void main()
     normal = bend_towards(bend_towards(normal, geometric), to_eye);
 
     out_normals = vec4(octahedral_encode(geometric), octahedral_encode(normal));
-    out_albedo = vec4(clamp(color.rgb, 0.0, 1.0), 1.0);
+    out_albedo = vec4(clamp(color.rgb, 0.0, 1.0), float(draw.identity) * (1.0 / 65535.0));
     out_emission = vec4(emission, 1.0);
     out_motion = MOVES ? motion_vector() : vec2(0.0);
     // Last, since the samples above need the derivatives of whole quads.

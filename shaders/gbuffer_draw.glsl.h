@@ -14,6 +14,6 @@ layout(constant_id = 4) const bool VERTEX_COLORS = true;
 layout(constant_id = 5) const bool MOVES = true; // the camera, the instance or its vertices, since the last frame
 layout(constant_id = 6) const bool DEFORMS = true; // the vertices do; only where MOVES
 
-layout(push_constant, scalar) uniform draw_block { uint instance; uint primitive; } draw;
+layout(push_constant, scalar) uniform draw_block { uint instance; uint primitive; uint identity; } draw;
 
 #endif

@@ -1,8 +1,20 @@
-// Finding a pixel's surface in the last frame: four bilinear taps, each refused where it shows another surface.
+// Finding a pixel's surface in the last frame: four bilinear taps, each refused where it shows another surface. Its
+// images are bound from REPROJECT_BINDING on (default 0), in the order of reproject_declare (modules/filters.h).
 #ifndef REPROJECT_GLSL_H
 #define REPROJECT_GLSL_H
 
 #include "filter_geometry.glsl.h"
+
+#ifndef REPROJECT_BINDING
+#define REPROJECT_BINDING 0
+#endif
+layout(set = 0, binding = REPROJECT_BINDING) uniform sampler2D depth_map;
+layout(set = 0, binding = REPROJECT_BINDING + 1) uniform sampler2D normal_map;
+layout(set = 0, binding = REPROJECT_BINDING + 2) uniform sampler2D motion_map;
+layout(set = 0, binding = REPROJECT_BINDING + 3) uniform sampler2D albedo_map;
+layout(set = 0, binding = REPROJECT_BINDING + 4) uniform sampler2D previous_depth;
+layout(set = 0, binding = REPROJECT_BINDING + 5) uniform sampler2D previous_normals;
+layout(set = 0, binding = REPROJECT_BINDING + 6) uniform sampler2D previous_albedo;
 
 struct reprojection {
     ivec2 corner; // taps: corner + (0,0), (1,0), (0,1), (1,1)
@@ -19,25 +31,28 @@ vec3 previous_position(ivec2 pixel, float depth)
 }
 
 // Pixels that the surface itself moved, beyond what the camera's motion explains.
-float object_motion(uvec2 pixel, vec3 position, vec2 motion)
+float object_motion(vec3 position, vec2 place)
 {
     vec4 clip = frame.previous_view_projection * vec4(position, 1.0);
     if (clip.w <= 0.0)
         return 0.0;
     vec2 previous = (clip.xy / clip.w * 0.5 + 0.5) * vec2(frame.width, frame.height);
-    return length(previous - (vec2(pixel) + 0.5 + motion));
+    return length(previous - (place + 0.5));
 }
 
-// `motion` leads from this pixel to its place in the last frame. False where the last frame did not show the surface.
-bool reproject(uvec2 pixel, gbuffer_point point, vec2 motion, sampler2D previous_depth, sampler2D previous_normals,
-               out reprojection r)
+// A pixel's place in the last frame.
+vec2 reprojection_place(uvec2 pixel) { return vec2(pixel) + texelFetch(motion_map, ivec2(pixel), 0).xy; }
+
+// False where the last frame did not show the surface.
+bool reproject(uvec2 pixel, gbuffer_point point, out reprojection r)
 {
-    vec2 place = vec2(pixel) + motion;
+    float identity = texelFetch(albedo_map, ivec2(pixel), 0).a;
+    vec2 place = reprojection_place(pixel);
     r.corner = ivec2(floor(place));
     vec2 f = place - vec2(r.corner);
     r.weights = vec4((1.0 - f.x) * (1.0 - f.y), f.x * (1.0 - f.y), (1.0 - f.x) * f.y, f.x * f.y);
     // An object that moved sideways by some pixels may have moved as far along its normal.
-    float moved = object_motion(pixel, point.position, motion);
+    float moved = object_motion(point.position, place);
     float tolerance = pixel_footprint(point.view_z) * (2.0 + (moved > 0.1 ? 2.0 * moved : 0.0));
     for (int i = 0; i < 4; i++) {
         ivec2 tap = reprojection_tap(r, i);
@@ -47,7 +62,7 @@ bool reproject(uvec2 pixel, gbuffer_point point, vec2 motion, sampler2D previous
         }
         float depth = texelFetch(previous_depth, tap, 0).x;
         vec3 normal = octahedral_decode(texelFetch(previous_normals, tap, 0).xy);
-        if (depth <= 0.0 || dot(normal, point.geometric) < 0.9 ||
+        if (depth <= 0.0 || texelFetch(previous_albedo, tap, 0).a != identity || dot(normal, point.geometric) < 0.9 ||
             abs(dot(point.geometric, previous_position(tap, depth) - point.position)) > tolerance)
             r.weights[i] = 0.0;
     }

@@ -13,6 +13,7 @@
 #define LGH_BLEND_CONSTANT 3
 #include "lgh_shade.glsl.h"
 #include "reservoir.glsl.h"
+#include "shadow_again.glsl.h"
 #include "shadow_budget.glsl.h"
 
 layout(local_size_x = PIXEL_GROUP_WIDTH) in;
@@ -27,8 +28,9 @@ layout(set = 0, binding = 7, scalar) readonly buffer words_block { uint reservoi
 layout(set = 0, binding = 11, rgba32f) uniform image2D shadow_u;
 layout(set = 0, binding = 12, scalar) readonly buffer budget_block { budget_header budget; };
 layout(set = 0, binding = 13, scalar) readonly buffer plan_block { uint plan[]; };
+layout(set = 0, binding = 14, scalar) writeonly buffer records_block { shadow_record records[]; };
 #ifdef END_POINT_VPL
-layout(set = 0, binding = 14, scalar) readonly buffer samples_block { uvec4 samples[]; };
+layout(set = 0, binding = 15, scalar) readonly buffer samples_block { uvec4 samples[]; };
 #endif
 layout(push_constant, scalar) uniform push_block {
     uint interleave, emission, start_level, samples;
@@ -56,6 +58,7 @@ struct shadow_sample {
     vec3 centre_light; // decides the weight f
     vec3 end_light;    // what U uses
     vec3 end;
+    uint slot;         // of the VPL at the end, or LGH_NO_SAMPLE
 };
 
 float dealt_factor(uint count)
@@ -71,7 +74,7 @@ shadow_sample vpl_sample(uint slot, gbuffer_point p)
     float scale = float(push.interleave * push.interleave);
     scale *= lgh_blend(BLEND_LOWEST, distance(light.position, p.position), r);
     vec3 sent = scale * vpl_light(light, p, push.singularity);
-    return shadow_sample(sent, sent, light.position);
+    return shadow_sample(sent, sent, light.position, slot);
 }
 
 shadow_sample grid_sample(uint index, gbuffer_point p, uint random)
@@ -84,7 +87,7 @@ shadow_sample grid_sample(uint index, gbuffer_point p, uint random)
     vec3 sent = grid_light_sent(light, light.position, push.emission, p, push.singularity);
     shadow_sample s;
     s.centre_light = scale * sent;
-    s.end_light = scale * end_point_light(light, index, c, sent, p, random, s.end);
+    s.end_light = scale * end_point_light(light, index, c, sent, p, random, s.end, s.slot);
     return s;
 }
 
@@ -102,17 +105,31 @@ uint samples_used(uint index)
                push.samples);
 }
 
-// The part of the pixel's light that one of `used` samples stands for; black: it has none.
-vec3 sample_estimate(uint light, float f_sum, uint used, gbuffer_point p, uint random, out vec3 end)
+// The part of the pixel's light that one of `used` samples stands for; black: it has none. `slot` as in shadow_sample.
+vec3 sample_estimate(uint light, float f_sum, uint used, gbuffer_point p, uint random, out vec3 end, out uint slot)
 {
     end = p.position;
+    slot = LGH_NO_SAMPLE;
     if (light == RESERVOIR_EMPTY)
         return vec3(0.0);
     bool is_vpl = (light & RESERVOIR_VPL) != 0u;
     shadow_sample chosen = is_vpl ? vpl_sample(light & ~RESERVOIR_VPL, p) : grid_sample(light, p, random);
     end = chosen.end;
+    slot = chosen.slot;
     float f = UNIFORM ? 1.0 : luminance(chosen.centre_light);
     return f > 0.0 ? chosen.end_light * (f_sum / (f * float(used))) : vec3(0.0);
+}
+
+// A sample to be traced again in the next frame.
+shadow_record record_of(float estimate, gbuffer_point p, vec3 end, uint slot)
+{
+    float light = slot != LGH_NO_SAMPLE ? luminance(vpl_light(vpls[slot], p, push.singularity)) : 1.0;
+    shadow_record made;
+    made.slot = slot;
+    made.end = end;
+    made.light = estimate > 0.0 ? light : 0.0;
+    made.weight = made.light > 0.0 ? estimate / light : 0.0;
+    return made;
 }
 
 // Makes the ray of the batch's sample i where it has light, and adds that to U. Returns the number of rays.
@@ -121,7 +138,10 @@ uint make_ray(uvec2 pixel, uint i, float f_sum, uint used, gbuffer_point p, inou
     uint index = pixel.y * frame.width + pixel.x, s = push.first + i, ray = light_ray_index(pixel, i);
     uint random = hash(hash(index, frame.frame, frame.seed), 0x51ed270bu, s);
     vec3 end;
-    vec3 estimate = sample_estimate(reservoir_light(index, s), f_sum, used, p, random, end);
+    uint slot;
+    vec3 estimate = sample_estimate(reservoir_light(index, s), f_sum, used, p, random, end, slot);
+    if (s == 0u && again_pixel(again_stratum(pixel)) == pixel)
+        records[again_index(again_stratum(pixel))] = record_of(luminance(estimate), p, end, slot);
     if (luminance(estimate) <= 0.0) {
         light_ray_write_none(ray);
         return 0u;
@@ -147,6 +167,8 @@ void main()
                 rays += make_ray(pixel, i, f_sum, used, point, u);
             else
                 light_ray_write_none(light_ray_index(pixel, i));
+        if (push.first == 0u && used == 0u && again_pixel(again_stratum(pixel)) == pixel)
+            records[again_index(again_stratum(pixel))].light = 0.0;
         imageStore(shadow_u, ivec2(pixel), vec4(u, f_sum > 0.0 && used == 0u ? 1.0 : 0.0));
     }
     ray_count(rays);

@@ -4,6 +4,7 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "interleave.glsl.h"
+#define REPROJECT_BINDING 2
 #include "reproject.glsl.h"
 #include "shadow_budget.glsl.h"
 #include "svgf.glsl.h"
@@ -11,15 +12,10 @@
 layout(local_size_x = 16, local_size_y = 16) in;
 layout(set = 0, binding = 0, scalar) buffer header_block { budget_header header; };
 layout(set = 0, binding = 1, scalar) writeonly buffer plan_block { uint plan[]; };
-layout(set = 0, binding = 2) uniform sampler2D depth_map;
-layout(set = 0, binding = 3) uniform sampler2D normal_map;
-layout(set = 0, binding = 4) uniform sampler2D motion_map;
-layout(set = 0, binding = 5) uniform sampler2D indirect_map;
-layout(set = 0, binding = 6) uniform sampler2D previous_depth;
-layout(set = 0, binding = 7) uniform sampler2D previous_normals;
-layout(set = 0, binding = 8) uniform sampler2D previous_unshadowed;
-layout(set = 0, binding = 9) uniform sampler2D previous_shadowed;
-layout(set = 0, binding = 10) uniform sampler2D previous_moments;
+layout(set = 0, binding = 9) uniform sampler2D indirect_map;
+layout(set = 0, binding = 10) uniform sampler2D previous_unshadowed;
+layout(set = 0, binding = 11) uniform sampler2D previous_shadowed;
+layout(set = 0, binding = 12) uniform sampler2D previous_moments;
 layout(push_constant, scalar) uniform push_block { uint interleave, history_valid; } push;
 
 // Samples of a history; below, its variance means nothing. With 4, the pixels whose first samples were all occluded by
@@ -51,8 +47,7 @@ uint entry_of(uvec2 pixel)
     if (!(light > 0.0))
         return 0u;
     reprojection r;
-    vec2 motion = texelFetch(motion_map, ivec2(pixel), 0).xy;
-    if (push.history_valid == 0u || !reproject(pixel, point, motion, previous_depth, previous_normals, r))
+    if (push.history_valid == 0u || !reproject(pixel, point, r))
         return priority_entry(sqrt(light) * DEVIATION_NEW, true);
     // The tap with the most weight stands for all.
     int best = 0;

@@ -13,12 +13,13 @@ vec3 jittered(grid_light light, uint random)
 
 #ifdef END_POINT_VPL
 
-// What the light's end point sends in the whole light's place, without blending; `end` becomes the end point.
+// What the light's end point sends in the whole light's place, without blending; `end` becomes the end point and `slot`
+// the VPL there, or LGH_NO_SAMPLE.
 vec3 end_point_light(grid_light light, uint index, uint c, vec3 centre_light, gbuffer_point p, uint random,
-                     out vec3 end)
+                     out vec3 end, out uint slot)
 {
     end = light.position;
-    uint slot = index; // of a VPL in the end; on the way, the place of a grid light
+    slot = index; // of a VPL in the end; on the way, the place of a grid light
     for (; c < header.level_count && slot != LGH_NO_SAMPLE; c++) {
         random = hash(random);
         slot = samples[slot][random & 3u];
@@ -36,9 +37,10 @@ vec3 end_point_light(grid_light light, uint index, uint c, vec3 centre_light, gb
 #else
 
 vec3 end_point_light(grid_light light, uint index, uint c, vec3 centre_light, gbuffer_point p, uint random,
-                     out vec3 end)
+                     out vec3 end, out uint slot)
 {
     end = light.position;
+    slot = LGH_NO_SAMPLE;
     if (!JITTER)
         return centre_light;
     end = jittered(light, random);

@@ -8,16 +8,11 @@
 #include "filter_geometry.glsl.h"
 #include "ratio.glsl.h"
 
-// A new frame's least share of the history, which is then worth 2 / share - 1 frames. Measured on the Cornell box with
-// one sample: the settled deviation over time is 0.0097, 0.0069 and 0.0056 with 1/8, 1/16 and 1/32, the error 0.042, 0.041
-// and 0.041, while what `agreement` cannot tell from noise takes 22, 46 and 94 frames to fade.
-const float SVGF_SHARE = 1.0 / 16.0;
-
 // Frames below which a variance over time means nothing.
 const float SVGF_TEMPORAL_FRAMES = 4.0;
 
-// Independent frames that a history of `frames` frames is worth.
-float svgf_frames(float frames) { return clamp(frames, 1.0, 2.0 / SVGF_SHARE - 1.0); }
+// Independent frames that a history is worth: as many as it counts.
+float svgf_frames(float frames) { return max(frames, 1.0); }
 
 // (Var(r), Var(U) / E[U]^2) of one sample from the means of U and S and the second moments (UU, SU, SS).
 vec2 svgf_variance(float unshadowed, float shadowed, vec3 moments)
@@ -28,6 +23,12 @@ vec2 svgf_variance(float unshadowed, float shadowed, vec3 moments)
     float r = shadowed / unshadowed;
     float ratio = dot(vec3(r * r, -2.0 * r, 1.0), relative);
     return clamp(vec2(ratio, relative.x - 1.0), vec2(0.0), vec2(1.0, 1e3));
+}
+
+// Of U and of the ratio of what is accumulated, from the variances of one sample.
+vec2 svgf_mean_variance(vec2 variance, float unshadowed, float frames)
+{
+    return vec2(variance.y * unshadowed * unshadowed, variance.x) / svgf_frames(frames);
 }
 
 // ---- The pair between the steps of one frame: a word per channel, U's upper 16 bits and S's (float32 cut to 8 bits of

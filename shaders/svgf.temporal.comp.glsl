@@ -3,28 +3,28 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "reproject.glsl.h"
+#include "shadow_again.glsl.h"
 #include "svgf.glsl.h"
 
 layout(local_size_x = PIXEL_GROUP_WIDTH) in;
-layout(set = 0, binding = 0) uniform sampler2D depth_map;
-layout(set = 0, binding = 1) uniform sampler2D normal_map;
-layout(set = 0, binding = 2) uniform sampler2D motion_map;
-layout(set = 0, binding = 3) uniform sampler2D previous_depth;
-layout(set = 0, binding = 4) uniform sampler2D previous_normals;
-layout(set = 0, binding = 5, rgba32f) uniform readonly image2D geometry_map;
-layout(set = 0, binding = 6, rgba32f) uniform readonly image2D unshadowed_map;
-layout(set = 0, binding = 7, rgba32f) uniform readonly image2D shadowed_map;
-layout(set = 0, binding = 8, rgba32f) uniform readonly image2D previous_unshadowed;
-layout(set = 0, binding = 9, rgba32f) uniform readonly image2D previous_shadowed;
-layout(set = 0, binding = 10, rgba32f) uniform readonly image2D previous_moments;
-layout(set = 0, binding = 11, rg32f) uniform readonly image2D previous_means;
-layout(set = 0, binding = 12, rgba32f) uniform writeonly image2D accumulated_unshadowed;
-layout(set = 0, binding = 13, rgba32f) uniform writeonly image2D accumulated_shadowed;
-layout(set = 0, binding = 14, rgba32f) uniform writeonly image2D accumulated_moments;
-layout(set = 0, binding = 15, rgba32ui) uniform writeonly uimage2D out_pair;
+layout(set = 0, binding = 7, rgba32f) uniform readonly image2D geometry_map;
+layout(set = 0, binding = 8, rgba32f) uniform readonly image2D unshadowed_map;
+layout(set = 0, binding = 9, rgba32f) uniform readonly image2D shadowed_map;
+layout(set = 0, binding = 10, rgba32f) uniform readonly image2D previous_unshadowed;
+layout(set = 0, binding = 11, rgba32f) uniform readonly image2D previous_shadowed;
+layout(set = 0, binding = 12, rgba32f) uniform readonly image2D previous_moments;
+layout(set = 0, binding = 13, rg32f) uniform readonly image2D previous_means;
+layout(set = 0, binding = 14, rgba32f) uniform writeonly image2D accumulated_unshadowed;
+layout(set = 0, binding = 15, rgba32f) uniform writeonly image2D accumulated_shadowed;
+layout(set = 0, binding = 16, rgba32f) uniform writeonly image2D accumulated_moments;
+layout(set = 0, binding = 17, rgba32ui) uniform writeonly uimage2D out_pair;
+layout(set = 0, binding = 18) uniform sampler2D limit_map;
 layout(push_constant, scalar) uniform push_block {
     uint history_valid;
-    uint light_shown; // 1: U is shown, not only the ratio
+    uint light_shown;  // 1: U is shown, not only the ratio
+    uint has_limit;    // 1: limit_map is what shadow_again.limit.comp.glsl makes
+    float frames_max;  // that a history counts
+    float share_min;   // of a new frame
 } push;
 
 struct accumulated {
@@ -126,17 +126,18 @@ float agreement(surroundings around, accumulated before, vec2 means_before)
 accumulated accumulate(ivec2 pixel, gbuffer_point point, surroundings around)
 {
     accumulated now = current(pixel, around.brightest_neighbour);
-    vec2 motion = texelFetch(motion_map, pixel, 0).xy;
     reprojection r;
-    if (push.history_valid == 0u || !reproject(uvec2(pixel), point, motion, previous_depth, previous_normals, r))
+    if (push.history_valid == 0u || !reproject(uvec2(pixel), point, r))
         return is_sampled(pixel) ? now : accumulated(vec3(0.0), vec3(0.0), vec4(0.0));
     vec2 means_before;
     accumulated before = history(r, means_before);
     float kept = before.moments.w * (around.count > 0.0 ? agreement(around, before, means_before) : 1.0);
+    if (push.has_limit != 0u)
+        kept = min(kept, again_limit(limit_map, reprojection_place(uvec2(pixel))));
     if (!is_sampled(pixel))
         return accumulated(before.unshadowed, before.shadowed, vec4(before.moments.xyz, kept));
-    float frames = min(kept + 1.0, 2.0 / SVGF_SHARE);
-    float share = max(1.0 / frames, SVGF_SHARE);
+    float frames = min(kept + 1.0, push.frames_max);
+    float share = max(1.0 / frames, push.share_min);
     return accumulated(mix(before.unshadowed, now.unshadowed, share), mix(before.shadowed, now.shadowed, share),
                        vec4(mix(before.moments.xyz, now.moments.xyz, share), frames));
 }
@@ -148,7 +149,7 @@ vec2 variance_of(accumulated sum, surroundings around)
     vec2 variance = sum.moments.w < SVGF_TEMPORAL_FRAMES
                         ? svgf_variance(around.means.x, around.means.y, around.moments)
                         : svgf_variance(u, s, sum.moments.xyz);
-    return vec2(variance.y * u * u, variance.x) / svgf_frames(sum.moments.w);
+    return svgf_mean_variance(variance, u, sum.moments.w);
 }
 
 void main()

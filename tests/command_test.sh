@@ -193,7 +193,7 @@ for arguments in --help -h "render --help" "render -h" "compare --help" "compare
 done
 run render --help
 for option in -o --size --camera --eye --target --fov --vpls --bounces --alpha --levels --shadow-samples --interleave \
-  --emission --end-point --frames --seed --exposure --only --no-filter --no-taa --start-level --no-sample-s1 --blend --sampling \
+  --emission --end-point --frames --seed --exposure --only --no-filter --taa --no-taa --start-level --no-sample-s1 --blend --sampling \
   --reservoirs --build --s1 --singularity --sun --animation --time --aov --stats --dump-graph --device --validate; do
   grep -q -- "^  $option " "$work/stdout" || fail "render --help has no $option"
 done

@@ -25,6 +25,7 @@ typedef struct stage {
     gpu_buffer uploads[16];
     uint32_t upload_count;
     uint16_t motion_x; // of every pixel, a half float
+    uint16_t identity[TEXELS_MAX]; // what tells instances apart
 } stage;
 
 // ---- Helpers
@@ -62,6 +63,7 @@ static stage *stage_create(uint32_t width, uint32_t height)
     s->frame = gpu_buffer_create(device, &desc);
     gpu_scene_bind_buffer(device, SCENE_FRAME, s->frame);
     for (uint32_t i = 0; i < width * height; i++) {
+        s->identity[i] = 1;
         s->view_z[i] = 10;
         s->normal[i][2] = 1;
     }
@@ -133,16 +135,19 @@ static void frame_begin(stage *s)
     static float depth[TEXELS_MAX];
     static int16_t normals[TEXELS_MAX][4];
     static uint16_t motion[TEXELS_MAX][2];
+    static uint16_t albedo[TEXELS_MAX][4];
     for (uint32_t i = 0; i < s->width * s->height; i++) {
         depth[i] = s->view_z[i] > 0 ? 0.1f / s->view_z[i] : 0;
         normal_encode(s->normal[i], normals[i]);
         motion[i][0] = s->motion_x;
+        albedo[i][3] = s->identity[i];
     }
     CHECK(gpu_buffer_write(device, s->frame, 0, &s->constants, sizeof s->constants));
     frame_graph_begin(s->graph);
     inject(s, "depth", VK_FORMAT_D32_SFLOAT, s->width, s->height, depth);
     inject(s, "normals", VK_FORMAT_R16G16B16A16_SNORM, s->width, s->height, normals);
     inject(s, "motion", VK_FORMAT_R16G16_SFLOAT, s->width, s->height, motion);
+    inject(s, "albedo", VK_FORMAT_R16G16B16A16_UNORM, s->width, s->height, albedo);
     svgf_declare_geometry(&filter, s->graph, s->width, s->height);
 }
 
@@ -169,13 +174,13 @@ static void pair_inject(stage *s, const texel *unshadowed, const texel *shadowed
     inject(s, "shadow_s", VK_FORMAT_R32G32B32A32_SFLOAT, s->width, s->height, shadowed);
 }
 
-// One frame of svgf; `interleave` and `light_shown` as of svgf_declare.
-static void filter_frame_of(stage *s, const texel *unshadowed, const texel *shadowed, uint32_t interleave,
-                            bool light_shown, texel *out_u, texel *out_s)
+// One frame of svgf.
+static void filter_frame_of(stage *s, const texel *unshadowed, const texel *shadowed, const svgf_desc *desc,
+                            texel *out_u, texel *out_s)
 {
     frame_begin(s);
     pair_inject(s, unshadowed, shadowed);
-    svgf_declare(&filter, s->graph, s->width, s->height, "shadow", interleave, light_shown);
+    svgf_declare(&filter, s->graph, s->width, s->height, "shadow", desc);
     frame_graph_export(s->graph, "shadow_u_filtered", ACCESS_TRANSFER_READ);
     frame_graph_export(s->graph, "shadow_s_filtered", ACCESS_TRANSFER_READ);
     frame_graph_export(s->graph, "shadow_moments", ACCESS_TRANSFER_READ);
@@ -186,7 +191,7 @@ static void filter_frame_of(stage *s, const texel *unshadowed, const texel *shad
 
 static void filter_frame(stage *s, const texel *unshadowed, const texel *shadowed, texel *out_u, texel *out_s)
 {
-    filter_frame_of(s, unshadowed, shadowed, 1, false, out_u, out_s);
+    filter_frame_of(s, unshadowed, shadowed, &(svgf_desc){0}, out_u, out_s);
 }
 
 static float half_decode(uint16_t half) // of non-negative finite numbers
@@ -202,7 +207,7 @@ static void taa_frame(stage *s, const texel *unshadowed, const texel *shadowed, 
     frame_begin(s);
     pair_inject(s, unshadowed, shadowed);
     taa_declare_ratio(&steadier, s->graph, s->width, s->height, "shadow");
-    taa_declare(&steadier, s->graph, s->width, s->height, "shadow");
+    taa_declare(&steadier, s->graph, s->width, s->height, "shadow", &(taa_desc){0});
     frame_graph_export(s->graph, "shadow_ratio", ACCESS_TRANSFER_READ);
     frame_end(s);
     const gpu_image image = frame_graph_find_image(s->graph, "shadow_ratio");
@@ -440,7 +445,7 @@ TEST(filter_keeps_the_mean_of_noisy_light_that_is_shown)
             texel_set(in_u[i], light, light, light);
             texel_set(in_s[i], visible * light, visible * light, visible * light);
         }
-        filter_frame_of(s, in_u, in_s, 1, true, out_u, out_s);
+        filter_frame_of(s, in_u, in_s, &(svgf_desc){.light_shown = true}, out_u, out_s);
         const statistics filtered = statistics_of(s, out_u, out_s);
         CHECK_NEAR(filtered.mean_u, 1, 0.01);
         CHECK_NEAR(filtered.mean_s, 0.5, 0.01);
@@ -464,7 +469,7 @@ TEST(filter_hides_the_tiles_of_interleaving)
             texel_set(in_s[i], visible, visible, visible);
         }
         for (int frame = 0; frame < 6; frame++)
-            filter_frame_of(s, in_u, in_s, n, false, out_u, out_s);
+            filter_frame_of(s, in_u, in_s, &(svgf_desc){.interleave = n}, out_u, out_s);
         for (uint32_t y = 16; y < 48; y++)
             for (uint32_t x = 16; x < 48; x++)
                 CHECK_NEAR(out_s[y * 64 + x][0] / out_u[y * 64 + x][0], 0.5, 0.01);
@@ -520,6 +525,60 @@ TEST(history_ends_where_another_surface_appears)
     const texel *history = history_read(s);
     for (uint32_t i = 0; i < 64 * 64; i++)
         CHECK_NEAR(history[i][3], i % 64 >= 20 && i % 64 < 44 ? 3 : 1, 0.01);
+    stage_destroy(s);
+}
+
+// Something else in the same place, in the same plane: an instance that slid over another.
+TEST(history_ends_where_another_instance_appears)
+{
+    stage *s = stage_create(64, 64);
+    for (uint32_t i = 0; i < 64 * 64; i++) {
+        texel_set(in_u[i], 1, 1, 1);
+        texel_set(in_s[i], 0.5f, 0.5f, 0.5f);
+    }
+    filter_frame(s, in_u, in_s, out_u, out_s);
+    filter_frame(s, in_u, in_s, out_u, out_s);
+    for (uint32_t i = 0; i < 64 * 64; i++)
+        s->identity[i] = i % 64 < 20 ? 2 : 1;
+    filter_frame(s, in_u, in_s, out_u, out_s);
+    const texel *history = history_read(s);
+    for (uint32_t i = 0; i < 64 * 64; i++)
+        CHECK_NEAR(history[i][3], i % 64 >= 20 ? 3 : 1, 0.01);
+    stage_destroy(s);
+}
+
+// While nothing changes, the history is the mean of all frames: its noise falls with their number.
+TEST(history_of_a_still_picture_grows_and_then_holds)
+{
+    static texel before_u[TEXELS_MAX], before_s[TEXELS_MAX];
+    stage *s = stage_create(64, 64);
+    uint32_t random = 29;
+    for (uint32_t frame = 0; frame < STILL_SAMPLES; frame++) {
+        pair_of_samples(s, 0.5f, &random);
+        filter_frame_of(s, in_u, in_s, &(svgf_desc){.still_frames = frame}, out_u, out_s);
+    }
+    const texel *history = history_read(s);
+    for (uint32_t i = 0; i < 64 * 64; i++)
+        CHECK(history[i][3] >= 1 && history[i][3] <= STILL_SAMPLES);
+    double frames = 0;
+    for (uint32_t i = 0; i < 64 * 64; i++)
+        frames += (double)history[i][3] / (64 * 64);
+    printf("  %.1f frames of %u in the history\n", frames, STILL_SAMPLES);
+    CHECK(frames > 0.9 * STILL_SAMPLES); // what looks like a change by chance costs some
+    for (int frame = 0; frame < 3; frame++) { // the pair is not read any more
+        memcpy(before_u, out_u, sizeof before_u);
+        memcpy(before_s, out_s, sizeof before_s);
+        pair_of_samples(s, 0.1f, &random);
+        filter_frame_of(s, in_u, in_s, &(svgf_desc){.hold = true}, out_u, out_s);
+        for (uint32_t i = 0; i < 64 * 64 && frame > 0; i++)
+            CHECK(memcmp(before_u[i], out_u[i], sizeof(texel)) == 0 &&
+                  memcmp(before_s[i], out_s[i], sizeof(texel)) == 0);
+    }
+    // Something changes: the history goes on from what was held.
+    filter_frame(s, in_u, in_s, out_u, out_s);
+    history = history_read(s);
+    for (uint32_t i = 0; i < 64 * 64; i++)
+        CHECK(history[i][3] <= 31);
     stage_destroy(s);
 }
 
@@ -719,6 +778,8 @@ int main(void)
     RUN(filter_hides_the_tiles_of_interleaving);
     RUN(history_follows_the_camera);
     RUN(history_ends_where_another_surface_appears);
+    RUN(history_ends_where_another_instance_appears);
+    RUN(history_of_a_still_picture_grows_and_then_holds);
     RUN(change_of_light_leaves_no_lag);
     RUN(pixels_without_a_sample_keep_their_history);
     RUN(filter_stops_at_a_step_in_depth);

@@ -146,9 +146,10 @@ TEST(pixels_hold_the_plane_that_they_look_at)
                 for (int k = 0; k < 3; k++)
                     CHECK_NEAR(n[k], normal[k], 1e-4);
             }
-            const float expected[4] = {0.5f, 0.25f, 0.75f, 1};
-            for (int k = 0; k < 4; k++)
+            const float expected[3] = {0.5f, 0.25f, 0.75f};
+            for (int k = 0; k < 3; k++)
                 CHECK_NEAR(albedo[i][k] / 65535.0, expected[k], 1e-4);
+            CHECK(albedo[i][3] == world_identity(r->gpu_world->order[0].entity));
         }
     CHECK(inside > 20);
     free(depth);

@@ -202,11 +202,25 @@ TEST(names_set_their_enums_and_errors_list_them)
     CHECK(set("end-point", "centre") && settings.end_point == END_POINT_CENTRE);
 }
 
+TEST(taa_names_what_it_steadies_or_is_off)
+{
+    char text[32];
+    CHECK(set("taa", "light") && settings.taa && settings.taa_target == TAA_LIGHT);
+    settings_get(&settings, settings_find("taa"), text);
+    CHECK_STRING(text, "light");
+    CHECK(set("taa", "off") && !settings.taa);
+    settings_get(&settings, settings_find("taa"), text);
+    CHECK_STRING(text, "off");
+    CHECK(set("taa", "ratio") && settings.taa && settings.taa_target == TAA_RATIO);
+    CHECK(malformed("taa", "true") && malformed("taa", ""));
+}
+
 TEST(switches_take_no_value_or_a_truth_value)
 {
     CHECK(set("no-filter", NULL) && !settings.filter);
     CHECK(set("no-filter", "false") && settings.filter);
     CHECK(set("no-taa", "true") && !settings.taa);
+    CHECK(set("no-taa", "false") && settings.taa);
     CHECK(set("no-sample-s1", NULL) && !settings.sample_s1);
     CHECK(set("no-sample-s1", "false") && settings.sample_s1);
     CHECK(malformed("no-sample-s1", "1"));
@@ -243,6 +257,7 @@ int main(void)
     RUN_FRESH(levels_and_exposure_can_be_automatic);
     RUN_FRESH(interleave_is_1_2_or_4);
     RUN_FRESH(names_set_their_enums_and_errors_list_them);
+    RUN_FRESH(taa_names_what_it_steadies_or_is_off);
     RUN_FRESH(switches_take_no_value_or_a_truth_value);
     RUN_FRESH(an_option_without_its_value_is_refused);
     RUN_FRESH(a_long_value_is_cut_in_the_message);

@@ -1,6 +1,7 @@
 // The `lanternfield` command: reads its first word and hands over.
 #include "lanternfield_bench.h"
 #include "lanternfield_play.h"
+#include "lanternfield_stability.h"
 
 #include <string.h>
 
@@ -12,9 +13,10 @@ static const char help[] =
     "  lanternfield compare REF IMG...         error measures of pictures against a reference, and error maps\n"
     "  lanternfield bench SUITE.json -o DIR    measure a suite of configurations: CSV, charts, report; can be resumed\n"
     "  lanternfield play SCRIPT.json           frames or a movie of a playback script; can be resumed\n"
+    "  lanternfield stability SCRIPT.json -o DIR  measures over time of a playback script, against references: report\n"
     "  lanternfield info SCENE                 triangles, materials, lights, animations, cameras, bounds, warnings\n"
     "  lanternfield devices                    Vulkan devices, and for each what it lacks\n"
-    "  lanternfield COMMAND --help             all options of render, compare, bench or play, with units and defaults\n"
+    "  lanternfield COMMAND --help             all options of the first five, with units and defaults\n"
     "  lanternfield --version\n"
     "\n"
     "SCENE is a .gltf or .glb file. Units are glTF's: metres, candela, lux, nits; angles are in degrees.\n"
@@ -78,8 +80,9 @@ int main(int argc, char **argv)
         int (*run)(int argc, char **argv); // the words behind the name
         bool has_help; // of its own
     } commands[] = {
-        {"render", render_command, true}, {"compare", compare_command, true}, {"bench", bench_command, true},
-        {"play", play_command, true},     {"info", info_command, false},      {"devices", devices_command, false},
+        {"render", render_command, true},       {"compare", compare_command, true}, {"bench", bench_command, true},
+        {"stability", stability_command, true}, {"play", play_command, true},       {"info", info_command, false},
+        {"devices", devices_command, false},
     };
 
     if (argc < 2) {

@@ -1,0 +1,15 @@
+// Where the history of the shadow ratio does not hold: one pixel in 16 keeps its first shadow sample, and when lights
+// or geometry change it is traced again in the next frame, with the light that its VPL sends now. The camera alone
+// changes nothing that these samples could tell.
+//
+//   shadow_records     one a stratum of 4 x 4 pixels: see shaders/shadow_again.glsl.h
+//   shadow_limit       R32F, a texel a stratum of the *last* frame: frames that the history may count around there
+#pragma once
+
+#include "renderer.h"
+
+// The next binding of the pass that makes the shadow rays: where it writes what it knows of the samples. Only the pass
+// of the first batch does.
+void shadow_again_record(renderer *r, frame_graph_pass *pass, bool first);
+// The name of the image, or NULL in a frame in which nothing is traced again.
+const char *shadow_again_limit(const renderer *r);

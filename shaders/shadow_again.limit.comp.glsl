@@ -1,0 +1,122 @@
+// How many frames the history may count around each stratum of the last frame: from what the recorded samples on the same
+// surface around were and are now, their light and whether it arrives.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#include "filter_geometry.glsl.h"
+#include "shadow_again.glsl.h"
+
+layout(local_size_x = PIXEL_GROUP_WIDTH) in;
+layout(set = 0, binding = 0, scalar) readonly buffer records_block { shadow_record records[]; };
+layout(set = 0, binding = 1, scalar) readonly buffer light_block { float light_now[]; }; // negative: not traced
+layout(set = 0, binding = 2, scalar) readonly buffer visible_block { uint visible_now[]; };
+layout(set = 0, binding = 3, r32f) uniform writeonly image2D limit_map;
+
+const int RADIUS = 3; // strata
+const float UNLIMITED = 1e6;
+// Variance of the ratio that the filter leaves of one frame's samples, about.
+const float VARIANCE = 0.001;
+// How much the ratio changes where all the light comes from elsewhere, about, and the share of the light that may come
+// from elsewhere before it counts: what drifts so slowly the history follows.
+const float LIGHT_CHANGE = 1.0, LIGHT_TOLERANCE = 0.2;
+
+struct sums {
+    vec4 light;   // U before, S before, U now, S now
+    vec3 squares; // of S: before, before times now, now
+    float count;  // records
+    float logarithms; // of now over before, of those that still have light
+    float lit;        // how many these are
+};
+
+struct neighbour {
+    bool counts; // lies on the same surface, and is known
+    float before, now; // what the sample adds to U
+    bool seen_before, seen_now;
+};
+
+neighbour neighbour_at(ivec2 stratum, shadow_record center, float footprint)
+{
+    neighbour n = neighbour(false, 0.0, 0.0, false, false);
+    ivec2 size = ivec2(again_size());
+    if (any(lessThan(stratum, ivec2(0))) || any(greaterThanEqual(stratum, size)))
+        return n;
+    uint index = again_index(uvec2(stratum));
+    shadow_record r = records[index];
+    if (r.light <= 0.0)
+        return n;
+    // What is seen at a grazing angle is far apart: records of one plane count wherever they are.
+    vec3 normal = octahedral_decode(center.normals.xy);
+    n.counts = dot(normal, octahedral_decode(r.normals.xy)) > 0.9 &&
+               abs(dot(normal, r.position - center.position)) < footprint;
+    n.before = r.weight * r.light;
+    n.now = r.weight * abs(light_now[index]);
+    n.seen_before = r.visible != 0u;
+    n.seen_now = light_now[index] > 0.0 ? visible_now[index] != 0u : n.seen_before;
+    return n;
+}
+
+void add(inout sums sum, neighbour n)
+{
+    float seen_before = n.seen_before ? n.before : 0.0, seen_now = n.seen_now ? n.now : 0.0;
+    sum.light += vec4(n.before, seen_before, n.now, seen_now);
+    sum.squares += vec3(seen_before * seen_before, seen_before * seen_now, seen_now * seen_now);
+    sum.count += 1.0;
+    if (n.now > 0.0) {
+        sum.logarithms += clamp(log(n.now / n.before), -4.0, 4.0);
+        sum.lit += 1.0;
+    }
+}
+
+// By how much the ratio S / U changed, beyond what a few samples that changed by themselves may explain.
+float ratio_change(sums sum)
+{
+    if (sum.light.x <= 0.0 || sum.light.z <= 0.0)
+        return 0.0;
+    vec2 scale = 1.0 / sum.light.xz;
+    float change = abs(sum.light.w * scale.y - sum.light.y * scale.x);
+    float square = dot(sum.squares, vec3(scale.x * scale.x, -2.0 * scale.x * scale.y, scale.y * scale.y));
+    return max(change - 2.0 * sqrt(max(square, 0.0)), 0.0);
+}
+
+// Of a ratio that drifts by d a frame, n frames are off by n d / 2 and leave the variance VARIANCE / n: the sum of the
+// squares is least at n^3 = 2 VARIANCE / d^2.
+float frames_of(float change)
+{
+    return change > 1e-4 ? pow(2.0 * VARIANCE / (change * change), 1.0 / 3.0) : UNLIMITED;
+}
+
+float limit_of(ivec2 stratum, shadow_record center)
+{
+    float view_z = dot(center.position - frame.previous_eye, frame.previous_forward);
+    float footprint = 4.0 * float(AGAIN_SIDE) * pixel_footprint(view_z);
+    sums sum = sums(vec4(0.0), vec3(0.0), 0.0, 0.0, 0.0);
+    for (int i = 0; i < (2 * RADIUS + 1) * (2 * RADIUS + 1); i++) {
+        neighbour n = neighbour_at(stratum + ivec2(i % (2 * RADIUS + 1), i / (2 * RADIUS + 1)) - RADIUS, center, footprint);
+        if (n.counts)
+            add(sum, n);
+    }
+    // What share of the light comes from elsewhere. All of it brighter or dimmer alike does not change the ratio.
+    float mean = exp(sum.logarithms / max(sum.lit, 1.0)), elsewhere = 0.0;
+    for (int i = 0; i < (2 * RADIUS + 1) * (2 * RADIUS + 1); i++) {
+        neighbour n = neighbour_at(stratum + ivec2(i % (2 * RADIUS + 1), i / (2 * RADIUS + 1)) - RADIUS, center, footprint);
+        if (n.counts)
+            elsewhere += abs(n.now - mean * n.before) / (n.now + mean * n.before);
+    }
+    // Of few records each may change by chance.
+    float tolerance = LIGHT_TOLERANCE + 0.5 * inversesqrt(max(sum.count, 1.0));
+    elsewhere = max(elsewhere / max(sum.count, 1.0) - tolerance, 0.0);
+    return frames_of(max(ratio_change(sum), LIGHT_CHANGE * elsewhere));
+}
+
+void main()
+{
+    ivec2 stratum = ivec2(gl_GlobalInvocationID.xy);
+    if (any(greaterThanEqual(stratum, ivec2(again_size()))))
+        return;
+    shadow_record center = records[again_index(uvec2(stratum))];
+    // Without a record of its own the stratum goes by one next to it.
+    for (int i = 0; i < 9 && center.light <= 0.0; i++) {
+        ivec2 next = clamp(stratum + ivec2(i % 3, i / 3) - 1, ivec2(0), ivec2(again_size()) - 1);
+        center = records[again_index(uvec2(next))];
+    }
+    imageStore(limit_map, stratum, vec4(center.light > 0.0 ? limit_of(stratum, center) : UNLIMITED));
+}
