@@ -11,25 +11,21 @@ typedef struct playing {
     entity entity;
 } playing;
 
-typedef struct animation_state {
+struct animation_state {
     animation_pose pose;
     bool *last_set; // as pose.set, of the last update
     bool driving; // some of it
     playing *playing; // of this update
     size_t playing_capacity;
     component_type clip; // "animation"
-} animation_state;
-
-static animation_state *state_of(const renderer *r)
-{
-    return ((render_pass *)ecs_get(r->world, renderer_pass_find(r, "animation"), r->pass))->state;
-}
+};
+typedef struct animation_state animation_state;
 
 entity animation_play(renderer *r, const animation_clip *clip)
 {
     assert(clip->animation < r->scene->animation_count);
     const entity e = ecs_entity_create(r->world);
-    *(animation_clip *)ecs_add(r->world, e, state_of(r)->clip) = *clip;
+    *(animation_clip *)ecs_add(r->world, e, r->animation->clip) = *clip;
     return e;
 }
 
@@ -128,7 +124,7 @@ static void materials_write(renderer *r, const animation_state *state)
 
 void animation_update(renderer *r)
 {
-    animation_state *state = state_of(r);
+    animation_state *state = r->animation;
     const uint32_t count = playing_list(r, state);
     if (count == 0 && !state->driving)
         return;
@@ -156,24 +152,11 @@ static void animation_run(ecs_world *world, void *user)
     animation_update(user);
 }
 
-static void animation_setup(renderer *r, void *state)
-{
-    (void)r, (void)state; // it works before frames
-}
-
-static void animation_fini(renderer *r, void *user)
-{
-    (void)r;
-    animation_state *state = user;
-    animation_pose_fini(&state->pose);
-    free(state->last_set);
-    free(state->playing);
-}
-
+// Its state is no pass's, as it has none: an entity more would change the ids of those that come later, and with them
+// the light paths of suns.
 bool animation_init(renderer *r)
 {
-    animation_state *state =
-        renderer_pass_add(r, "animation", sizeof(animation_state), animation_setup, animation_fini);
+    animation_state *state = r->animation = memory_alloc(sizeof *state);
     animation_pose_init(&state->pose, r->scene);
     state->last_set = memory_alloc(max_u32(state->pose.set_count, 1) * sizeof(bool));
     state->clip =
@@ -181,4 +164,14 @@ bool animation_init(renderer *r)
     const ecs_system_desc run = {.name = "animation", .phase = ECS_PHASE_INPUT, .run = animation_run, .user = r};
     ecs_system_register(r->world, &run);
     return true;
+}
+
+void animation_fini(renderer *r)
+{
+    if (!r->animation)
+        return;
+    animation_pose_fini(&r->animation->pose);
+    free(r->animation->last_set);
+    free(r->animation->playing);
+    free(r->animation);
 }

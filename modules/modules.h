@@ -6,6 +6,7 @@
 bool modules_init(renderer *r); // false on failure (logged)
 
 bool animation_init(renderer *r);
+void animation_fini(renderer *r); // by renderer_destroy, as it has no pass that would; accepts a renderer without it
 bool automatic_init(renderer *r);
 bool rays_init(renderer *r);
 bool light_rays_init(renderer *r);

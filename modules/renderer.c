@@ -262,6 +262,7 @@ void renderer_destroy(renderer *r)
         return;
     frame_graph_destroy(r->graph);
     ecs_world_destroy(r->world); // releases the passes' states
+    animation_fini(r);
     world_fini(r);
     free(r);
 }

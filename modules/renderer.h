@@ -90,6 +90,7 @@ typedef struct renderer {
     component_type pass; // render_pass
     component_type pass_state; // what renderer_pass_add keeps of a pass, switched on or off
     struct world_gpu *gpu_world; // modules/world.c
+    struct animation_state *animation; // modules/animation_system.c
     double time; // seconds, of the next frame, by the clock of its animations; may be changed between frames
     uint32_t frame; // number of frames rendered so far
     double milliseconds; // that the last frame took, by the clock
