@@ -285,9 +285,9 @@ static bool levels_make(renderer *r, deform_state *state)
 bool deform_init(renderer *r)
 {
     const uint32_t count = r->scene->deformation_count;
-    deform_state *state = renderer_pass_add(r, "deform", sizeof(deform_state), deform_setup, deform_fini);
-    if (count == 0)
+    if (count == 0) // takes no entity: light paths are keyed by those of their lights
         return true;
+    deform_state *state = renderer_pass_add(r, "deform", sizeof(deform_state), deform_setup, deform_fini);
     state->places = memory_alloc(count * sizeof *state->places);
     state->versions = memory_alloc(count * sizeof *state->versions);
     deform_place end;
