@@ -1,9 +1,5 @@
 // Many point lights in the lighting grid hierarchy: against closed forms, against the sum over all of them, against the
 // reference methods, and from frame to frame.
-//
-//     device_many_lights                    the tests
-//     device_many_lights lanterns W VPLS    error and energy of `lanterns` and `lanterns_500`, W x 9/16 W pixels: every
-//                                           light and VPL at every pixel with a ray each, a minute for 64 and 3000
 #include "brute_force.h"
 #include "quad_scene.h"
 #include "test.h"
@@ -644,56 +640,7 @@ TEST(the_validation_layer_has_nothing_to_say)
     CHECK(gpu_validation_messages(devices[0]) == 0 && gpu_validation_messages(devices[1]) == 0);
 }
 
-// What is shown against every light and VPL with a shadow ray each.
-static comparison shown_against_all(const char *path, uint32_t width, uint32_t vpls, float alpha)
-{
-    render_settings s = render_settings_default();
-    s.width = width;
-    s.height = width * 9 / 16;
-    s.vpls = vpls;
-    s.alpha = alpha;
-    scene_data *scene = scene_of(path);
-    renderer *r = renderer_of(devices[0], scene, &s);
-    r->camera = renderer_camera_of_scene(r, scene_camera_find(scene, "street"));
-    float *shown = NULL;
-    for (uint32_t frame = 0; frame < 24; frame++) {
-        free(shown);
-        shown = frame_image(r, "aov_indirect");
-    }
-    const size_t pixels = (size_t)s.width * s.height;
-    uint16_t *albedo = memory_alloc(pixels * 4 * sizeof *albedo);
-    brute_force_add(r, &shader_brute_force_shadowed_comp);
-    r->exports[1] = "albedo";
-    r->exports[0] = "brute_force";
-    r->export_count = 2;
-    CHECK(renderer_frame(r));
-    float *all = image_read(r, "brute_force");
-    CHECK(gpu_image_read(r->gpu, frame_graph_find_image(r->graph, "albedo"), VK_IMAGE_LAYOUT_TRANSFER_SRC_OPTIMAL,
-                         albedo, pixels * 4 * sizeof *albedo));
-    for (size_t i = 0; i < 4 * pixels; i++)
-        all[i] *= i % 4 < 3 && albedo[i / 4 * 4 + 3] > 0 ? (float)albedo[i] / 65535 : 0;
-    const comparison c = compare(shown, all, pixels);
-    free(shown);
-    free(all);
-    free(albedo);
-    renderer_destroy(r);
-    scene_destroy(scene);
-    return c;
-}
-
-static int lanterns_print(uint32_t width, uint32_t vpls)
-{
-    static const char *const scenes[] = {SCENES "lanterns.glb", SCENES "lanterns_500.glb"};
-    for (uint32_t alpha = 1; alpha <= 2; alpha++)
-        for (size_t i = 0; i < countof(scenes); i++) {
-            const comparison c = shown_against_all(scenes[i], width, vpls, (float)alpha);
-            printf("%s, alpha %u: relative error %.4f, energy %.4f\n", scenes[i], alpha, c.error, c.energy);
-            fflush(stdout);
-        }
-    return test_end();
-}
-
-int main(int argc, char **argv)
+int main(void)
 {
     for (size_t i = 0; i < countof(devices); i++) {
         devices[i] = gpu_create(&(gpu_desc){.validation = true});
@@ -702,8 +649,6 @@ int main(int argc, char **argv)
             return 77;
         }
     }
-    if (argc == 4 && strcmp(argv[1], "lanterns") == 0)
-        return lanterns_print((uint32_t)atoi(argv[2]), (uint32_t)atoi(argv[3]));
     RUN(lights_over_a_floor_sum_up_as_they_should);
     RUN(the_hierarchy_of_lights_converges_to_their_sum);
     RUN(interleaved_tiles_share_the_lights_out);
