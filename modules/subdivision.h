@@ -35,7 +35,8 @@ typedef struct subdivision_cage {
     uint32_t face_count;
     const uint32_t *face_sizes; // [face_count] corners, at least 3
     const uint32_t *corners; // vertices, face after face, counter-clockwise
-    // Face-varying values (texture coordinates, colours): smooth over edges whose two faces share theirs.
+    // Face-varying values (texture coordinates, colours): smooth over edges whose two faces share theirs, sharp at
+    // corners of their islands (OpenSubdiv's FVAR_LINEAR_CORNERS_PLUS1).
     const uint32_t *corner_values; // as `corners`, below value_count; two vertices share none
     const float (*values)[SUBDIVISION_VALUES];
     uint32_t value_count;
