@@ -233,6 +233,10 @@ struct stencil_builder {
             }
         }
         touched.clear();
+        if (entries.size() > SUBDIVISION_ENTRIES_MAX) {
+            throw std::runtime_error("its stencils have more than " + std::to_string(SUBDIVISION_ENTRIES_MAX) +
+                                     " weights");
+        }
         offsets.push_back(static_cast<uint32_t>(entries.size()));
         return static_cast<uint32_t>(offsets.size() - 2);
     }
@@ -416,6 +420,9 @@ void levels_make(arena *arena, const Far::TopologyRefiner &refiner, const std::v
 void fans_check(const Far::TopologyRefiner &refiner)
 {
     const Far::TopologyLevel &cage = refiner.GetLevel(0);
+    if (refiner.GetMaxValence() > SUBDIVISION_VALENCE_MAX) {
+        throw std::runtime_error("a vertex has more than " + std::to_string(SUBDIVISION_VALENCE_MAX) + " faces");
+    }
     for (int v = 0; v < cage.GetNumVertices(); v++) {
         if (cage.IsVertexNonManifold(v) || cage.GetVertexFaces(v).size() == 0) {
             throw std::runtime_error("the faces at vertex " + std::to_string(v) + " do not form one fan");

@@ -10,8 +10,9 @@
 #include "shaders/shared.h"
 
 enum { SUBDIVISION_LEVELS_MAX = 5, SUBDIVISION_SHARP = 10, SUBDIVISION_VALUES = 8 };
-// Triangles of the finest level, at most: about 170 MiB of stencils.
-enum { SUBDIVISION_TRIANGLES_MAX = 1 << 20 };
+// At most: triangles of the finest level; entries of the stencils, 128 MiB of them; faces at a vertex, all of whose
+// neighbours are in the stencils around it.
+enum { SUBDIVISION_TRIANGLES_MAX = 1 << 19, SUBDIVISION_ENTRIES_MAX = 1 << 23, SUBDIVISION_VALENCE_MAX = 64 };
 
 typedef enum subdivision_scheme {
     SUBDIVISION_CATMARK, // faces of any number of corners
@@ -35,7 +36,8 @@ typedef struct subdivision_cage {
     uint32_t face_count;
     const uint32_t *face_sizes; // [face_count] corners, at least 3
     const uint32_t *corners; // vertices, face after face, counter-clockwise
-    // Face-varying values (texture coordinates, colours): smooth over edges whose two faces share theirs.
+    // Face-varying values (texture coordinates, colours): smooth over edges whose two faces share theirs, sharp at
+    // corners of their islands (OpenSubdiv's FVAR_LINEAR_CORNERS_PLUS1).
     const uint32_t *corner_values; // as `corners`, below value_count; two vertices share none
     const float (*values)[SUBDIVISION_VALUES];
     uint32_t value_count;
@@ -70,9 +72,9 @@ typedef struct subdivision {
     subdivision_level levels[SUBDIVISION_LEVELS_MAX]; // [0] is level 1; max_level of them
 } subdivision;
 
-// Refines the cage; all that is in the result belongs to `arena`. False where the library or the triangles' limit
-// refuses it, with a reason that completes "cannot be subdivided: " (a file's cage is checked by scene_subdivision.c
-// before it comes here).
+// Refines the cage; all that is in the result belongs to `arena`. False where the library or a limit refuses it, with a
+// reason that completes "cannot be subdivided: " (a file's cage is checked by scene_subdivision.c before it comes
+// here).
 bool subdivision_refine(const subdivision_cage *cage, arena *arena, subdivision *result, char reason[256]);
 
 // Position, first and second tangent of a stencil over the cage's positions: what shaders/subdivide.comp.glsl does.

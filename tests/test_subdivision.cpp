@@ -544,6 +544,21 @@ TEST(faces_that_meet_in_a_vertex_alone_are_refused)
     CHECK(!r.ok && strstr(r.reason, "fan"));
 }
 
+TEST(too_many_faces_at_a_vertex_are_refused)
+{
+    cage c;
+    c.scheme = SUBDIVISION_LOOP;
+    c.positions = {{{0, 0, 0}}};
+    for (uint32_t i = 0; i < 65; i++) {
+        const float angle = 6.2831853f * static_cast<float>(i) / 65;
+        c.positions.push_back({{cosf(angle), sinf(angle), 0}});
+        c.sizes.push_back(3);
+        c.corners.insert(c.corners.end(), {0, 1 + i, 1 + (i + 1) % 65});
+    }
+    const refined r(c, 1);
+    CHECK(!r.ok && strstr(r.reason, "more than 64 faces"));
+}
+
 TEST(too_many_triangles_are_refused)
 {
     cage c = plane_make(40, 40);
@@ -568,6 +583,7 @@ int main()
     RUN(a_level_has_the_vertices_of_the_one_before);
     RUN(triangles_face_as_the_cage_does);
     RUN(faces_that_meet_in_a_vertex_alone_are_refused);
+    RUN(too_many_faces_at_a_vertex_are_refused);
     RUN(too_many_triangles_are_refused);
     return test_end();
 }
