@@ -9,7 +9,9 @@ layout(local_size_x = PIXEL_GROUP_WIDTH) in;
 layout(set = 0, binding = 0, scalar) readonly buffer records_block { shadow_record records[]; };
 layout(set = 0, binding = 1, scalar) readonly buffer light_block { float light_now[]; }; // negative: not traced
 layout(set = 0, binding = 2, scalar) readonly buffer visible_block { uint visible_now[]; };
-layout(set = 0, binding = 3, r32f) uniform writeonly image2D limit_map;
+layout(set = 0, binding = 3, rg32f) uniform writeonly image2D limit_map; // frames; the change, also that before
+layout(set = 0, binding = 4) uniform sampler2D previous_limit;
+layout(push_constant, scalar) uniform push_block { uint history_valid; } push; // 1: the last frame traced again too
 
 const int RADIUS = 3; // strata
 const float UNLIMITED = 1e6;
@@ -84,7 +86,18 @@ float frames_of(float change)
     return change > 1e-4 ? pow(2.0 * VARIANCE / (change * change), 1.0 / 3.0) : UNLIMITED;
 }
 
-float limit_of(ivec2 stratum, shadow_record center)
+// What changed around in the last frames, the oldest least.
+float change_before(ivec2 stratum)
+{
+    float before = 0.0;
+    for (int i = 0; i < 9 && push.history_valid != 0u; i++) {
+        ivec2 tap = clamp(stratum + ivec2(i % 3, i / 3) - 1, ivec2(0), ivec2(again_size()) - 1);
+        before = max(before, texelFetch(previous_limit, tap, 0).y);
+    }
+    return 0.9 * before;
+}
+
+float change_of(ivec2 stratum, shadow_record center)
 {
     float view_z = dot(center.position - frame.previous_eye, frame.previous_forward);
     float footprint = 4.0 * float(AGAIN_SIDE) * pixel_footprint(view_z);
@@ -104,7 +117,7 @@ float limit_of(ivec2 stratum, shadow_record center)
     // Of few records each may change by chance.
     float tolerance = LIGHT_TOLERANCE + 0.5 * inversesqrt(max(sum.count, 1.0));
     elsewhere = max(elsewhere / max(sum.count, 1.0) - tolerance, 0.0);
-    return frames_of(max(ratio_change(sum), LIGHT_CHANGE * elsewhere));
+    return max(ratio_change(sum), LIGHT_CHANGE * elsewhere);
 }
 
 void main()
@@ -118,5 +131,8 @@ void main()
         ivec2 next = clamp(stratum + ivec2(i % 3, i / 3) - 1, ivec2(0), ivec2(again_size()) - 1);
         center = records[again_index(uvec2(next))];
     }
-    imageStore(limit_map, stratum, vec4(center.light > 0.0 ? limit_of(stratum, center) : UNLIMITED));
+    float change = center.light > 0.0 ? change_of(stratum, center) : 0.0;
+    // What changes as much in frame after frame drifts, and the history follows; what is new counts.
+    float before = change_before(stratum), sudden = max(change - 1.5 * before, 0.0);
+    imageStore(limit_map, stratum, vec4(frames_of(sudden), max(change, before), 0.0, 0.0));
 }
