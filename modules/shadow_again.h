@@ -4,8 +4,9 @@
 //
 //   shadow_records     one a stratum of 4 x 4 pixels: see shaders/shadow_again.glsl.h
 //   shadow_limit       RG32F, a texel a stratum of the *last* frame: frames that the history may count around there,
-//                      and the change that was found. What changes alike in frame after frame does not count:
-//                      measured under a moving sun in the atrium, flicker is 0.077 if it does and 0.046 without limits
+//                      and the change of light that was found. Light that changes alike in frame after frame does
+//                      not count: under a moving sun in the atrium flicker is 0.077 if it does, 0.048 so, and 0.046
+//                      without limits
 #pragma once
 
 #include "renderer.h"

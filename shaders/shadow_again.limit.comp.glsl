@@ -27,6 +27,7 @@ struct sums {
     float count;  // records
     float logarithms; // of now over before, of those that still have light
     float lit;        // how many these are
+    vec3 same;        // of records whose VPL sends what it did: U, the change of S, and the squares of that
 };
 
 struct neighbour {
@@ -62,6 +63,10 @@ void add(inout sums sum, neighbour n)
     sum.light += vec4(n.before, seen_before, n.now, seen_now);
     sum.squares += vec3(seen_before * seen_before, seen_before * seen_now, seen_now * seen_now);
     sum.count += 1.0;
+    if (abs(n.now - n.before) < 0.01 * n.before) {
+        float change = n.before * (float(n.seen_now) - float(n.seen_before));
+        sum.same += vec3(n.before, change, change * change);
+    }
     if (n.now > 0.0) {
         sum.logarithms += clamp(log(n.now / n.before), -4.0, 4.0);
         sum.lit += 1.0;
@@ -77,6 +82,12 @@ float ratio_change(sums sum)
     float change = abs(sum.light.w * scale.y - sum.light.y * scale.x);
     float square = dot(sum.squares, vec3(scale.x * scale.x, -2.0 * scale.x * scale.y, scale.y * scale.y));
     return max(change - 2.0 * sqrt(max(square, 0.0)), 0.0);
+}
+
+// The same by what stands in the way of light that stays as it is: geometry that moves, which is no noise.
+float occlusion_change(sums sum)
+{
+    return max(abs(sum.same.y) - sqrt(sum.same.z), 0.0) / max(sum.light.x, 1e-30);
 }
 
 // Of a ratio that drifts by d a frame, n frames are off by n d / 2 and leave the variance VARIANCE / n: the sum of the
@@ -97,11 +108,12 @@ float change_before(ivec2 stratum)
     return 0.9 * before;
 }
 
-float change_of(ivec2 stratum, shadow_record center)
+// Of the light, and by what stands in its way.
+vec2 change_of(ivec2 stratum, shadow_record center)
 {
     float view_z = dot(center.position - frame.previous_eye, frame.previous_forward);
     float footprint = 4.0 * float(AGAIN_SIDE) * pixel_footprint(view_z);
-    sums sum = sums(vec4(0.0), vec3(0.0), 0.0, 0.0, 0.0);
+    sums sum = sums(vec4(0.0), vec3(0.0), 0.0, 0.0, 0.0, vec3(0.0));
     for (int i = 0; i < (2 * RADIUS + 1) * (2 * RADIUS + 1); i++) {
         neighbour n = neighbour_at(stratum + ivec2(i % (2 * RADIUS + 1), i / (2 * RADIUS + 1)) - RADIUS, center, footprint);
         if (n.counts)
@@ -117,7 +129,7 @@ float change_of(ivec2 stratum, shadow_record center)
     // Of few records each may change by chance.
     float tolerance = LIGHT_TOLERANCE + 0.5 * inversesqrt(max(sum.count, 1.0));
     elsewhere = max(elsewhere / max(sum.count, 1.0) - tolerance, 0.0);
-    return max(ratio_change(sum), LIGHT_CHANGE * elsewhere);
+    return vec2(max(ratio_change(sum), LIGHT_CHANGE * elsewhere), occlusion_change(sum));
 }
 
 void main()
@@ -131,8 +143,8 @@ void main()
         ivec2 next = clamp(stratum + ivec2(i % 3, i / 3) - 1, ivec2(0), ivec2(again_size()) - 1);
         center = records[again_index(uvec2(next))];
     }
-    float change = center.light > 0.0 ? change_of(stratum, center) : 0.0;
-    // What changes as much in frame after frame drifts, and the history follows; what is new counts.
-    float before = change_before(stratum), sudden = max(change - 1.5 * before, 0.0);
-    imageStore(limit_map, stratum, vec4(frames_of(sudden), max(change, before), 0.0, 0.0));
+    vec2 change = center.light > 0.0 ? change_of(stratum, center) : vec2(0.0);
+    // Light that changes as much in frame after frame drifts, and the history follows; what is new counts.
+    float before = change_before(stratum), sudden = max(change.x - 1.5 * before, 0.0);
+    imageStore(limit_map, stratum, vec4(frames_of(max(sudden, change.y)), max(change.x, before), 0.0, 0.0));
 }
