@@ -54,7 +54,9 @@ static void rays_execute(const frame_graph_context *context, void *user)
 static void limit_execute(const frame_graph_context *context, void *user)
 {
     const again_pass *args = user;
+    const uint32_t history_valid = frame_graph_history_valid(context, "shadow_limit");
     frame_graph_bind(context, args->pipeline);
+    gpu_push(context->commands, &history_valid, sizeof history_valid);
     gpu_dispatch(context->commands, div_up_u32(args->columns, PIXEL_GROUP_WIDTH), args->rows, 1);
 }
 
@@ -156,8 +158,9 @@ static void trace_declare(renderer *r, const shadow_again *state)
     frame_graph_read_previous(limit, "shadow_records", ACCESS_STORAGE_READ);
     frame_graph_read(limit, "shadow_again_light", ACCESS_STORAGE_READ);
     frame_graph_read(limit, "shadow_again_visible", ACCESS_STORAGE_READ);
-    const frame_graph_resource_desc image = frame_graph_image_of(VK_FORMAT_R32_SFLOAT, args.columns, args.rows);
+    const frame_graph_resource_desc image = frame_graph_image_of(VK_FORMAT_R32G32_SFLOAT, args.columns, args.rows);
     frame_graph_create_resource(limit, "shadow_limit", &image, ACCESS_STORAGE_WRITE);
+    frame_graph_read_previous(limit, "shadow_limit", ACCESS_SAMPLED);
 }
 
 // ---- The module

@@ -3,7 +3,10 @@
 // changes nothing that these samples could tell.
 //
 //   shadow_records     one a stratum of 4 x 4 pixels: see shaders/shadow_again.glsl.h
-//   shadow_limit       R32F, a texel a stratum of the *last* frame: frames that the history may count around there
+//   shadow_limit       RG32F, a texel a stratum of the *last* frame: frames that the history may count around there,
+//                      and the change of light that was found. Light that changes alike in frame after frame does
+//                      not count: under a moving sun in the atrium flicker is 0.077 if it does, 0.048 so, and 0.046
+//                      without limits
 #pragma once
 
 #include "renderer.h"

@@ -9,7 +9,9 @@ layout(local_size_x = PIXEL_GROUP_WIDTH) in;
 layout(set = 0, binding = 0, scalar) readonly buffer records_block { shadow_record records[]; };
 layout(set = 0, binding = 1, scalar) readonly buffer light_block { float light_now[]; }; // negative: not traced
 layout(set = 0, binding = 2, scalar) readonly buffer visible_block { uint visible_now[]; };
-layout(set = 0, binding = 3, r32f) uniform writeonly image2D limit_map;
+layout(set = 0, binding = 3, rg32f) uniform writeonly image2D limit_map; // frames; the change, also that before
+layout(set = 0, binding = 4) uniform sampler2D previous_limit;
+layout(push_constant, scalar) uniform push_block { uint history_valid; } push; // 1: the last frame traced again too
 
 const int RADIUS = 3; // strata
 const float UNLIMITED = 1e6;
@@ -25,6 +27,7 @@ struct sums {
     float count;  // records
     float logarithms; // of now over before, of those that still have light
     float lit;        // how many these are
+    vec3 same;        // of records whose VPL sends what it did: U, the change of S, and the squares of that
 };
 
 struct neighbour {
@@ -60,6 +63,10 @@ void add(inout sums sum, neighbour n)
     sum.light += vec4(n.before, seen_before, n.now, seen_now);
     sum.squares += vec3(seen_before * seen_before, seen_before * seen_now, seen_now * seen_now);
     sum.count += 1.0;
+    if (abs(n.now - n.before) < 0.01 * n.before) {
+        float change = n.before * (float(n.seen_now) - float(n.seen_before));
+        sum.same += vec3(n.before, change, change * change);
+    }
     if (n.now > 0.0) {
         sum.logarithms += clamp(log(n.now / n.before), -4.0, 4.0);
         sum.lit += 1.0;
@@ -77,6 +84,12 @@ float ratio_change(sums sum)
     return max(change - 2.0 * sqrt(max(square, 0.0)), 0.0);
 }
 
+// The same by what stands in the way of light that stays as it is: geometry that moves, which is no noise.
+float occlusion_change(sums sum)
+{
+    return max(abs(sum.same.y) - sqrt(sum.same.z), 0.0) / max(sum.light.x, 1e-30);
+}
+
 // Of a ratio that drifts by d a frame, n frames are off by n d / 2 and leave the variance VARIANCE / n: the sum of the
 // squares is least at n^3 = 2 VARIANCE / d^2.
 float frames_of(float change)
@@ -84,11 +97,23 @@ float frames_of(float change)
     return change > 1e-4 ? pow(2.0 * VARIANCE / (change * change), 1.0 / 3.0) : UNLIMITED;
 }
 
-float limit_of(ivec2 stratum, shadow_record center)
+// What changed around in the last frames, the oldest least.
+float change_before(ivec2 stratum)
+{
+    float before = 0.0;
+    for (int i = 0; i < 9 && push.history_valid != 0u; i++) {
+        ivec2 tap = clamp(stratum + ivec2(i % 3, i / 3) - 1, ivec2(0), ivec2(again_size()) - 1);
+        before = max(before, texelFetch(previous_limit, tap, 0).y);
+    }
+    return 0.9 * before;
+}
+
+// Of the light, and by what stands in its way.
+vec2 change_of(ivec2 stratum, shadow_record center)
 {
     float view_z = dot(center.position - frame.previous_eye, frame.previous_forward);
     float footprint = 4.0 * float(AGAIN_SIDE) * pixel_footprint(view_z);
-    sums sum = sums(vec4(0.0), vec3(0.0), 0.0, 0.0, 0.0);
+    sums sum = sums(vec4(0.0), vec3(0.0), 0.0, 0.0, 0.0, vec3(0.0));
     for (int i = 0; i < (2 * RADIUS + 1) * (2 * RADIUS + 1); i++) {
         neighbour n = neighbour_at(stratum + ivec2(i % (2 * RADIUS + 1), i / (2 * RADIUS + 1)) - RADIUS, center, footprint);
         if (n.counts)
@@ -104,7 +129,7 @@ float limit_of(ivec2 stratum, shadow_record center)
     // Of few records each may change by chance.
     float tolerance = LIGHT_TOLERANCE + 0.5 * inversesqrt(max(sum.count, 1.0));
     elsewhere = max(elsewhere / max(sum.count, 1.0) - tolerance, 0.0);
-    return frames_of(max(ratio_change(sum), LIGHT_CHANGE * elsewhere));
+    return vec2(max(ratio_change(sum), LIGHT_CHANGE * elsewhere), occlusion_change(sum));
 }
 
 void main()
@@ -118,5 +143,8 @@ void main()
         ivec2 next = clamp(stratum + ivec2(i % 3, i / 3) - 1, ivec2(0), ivec2(again_size()) - 1);
         center = records[again_index(uvec2(next))];
     }
-    imageStore(limit_map, stratum, vec4(center.light > 0.0 ? limit_of(stratum, center) : UNLIMITED));
+    vec2 change = center.light > 0.0 ? change_of(stratum, center) : vec2(0.0);
+    // Light that changes as much in frame after frame drifts, and the history follows; what is new counts.
+    float before = change_before(stratum), sudden = max(change.x - 1.5 * before, 0.0);
+    imageStore(limit_map, stratum, vec4(frames_of(max(sudden, change.y)), max(change.x, before), 0.0, 0.0));
 }

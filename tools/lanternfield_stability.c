@@ -441,7 +441,9 @@ static void run_close(stability_run *run)
 
 static bool variants_make(stability_run *run)
 {
-    run->ev = image_exposure(run->references[0], run->width, run->height);
+    const render_settings settings = playback_settings_at(run->script, run->begin);
+    run->ev = settings.auto_exposure ? image_exposure(run->references[0], run->width, run->height)
+                                     : (double)settings.exposure;
     bool ok = true;
     for (uint32_t v = 0; v < STABILITY_VARIANTS && ok && !interrupt_seen(); v++) {
         ok = variant_make(run, &run->variants[v]);

@@ -141,7 +141,7 @@ static gnuplot_result chart_write(const stability_run *run, const column *column
     FILE *const out = open_memstream(&text, &size);
     fprintf(out,
             "set xlabel 'frame'\nset ylabel '%s'\nset xrange [%u:%u]\nset yrange [0:*]\nset grid lc rgb '#dddddd'\n"
-            "set key outside bottom center horizontal\n",
+            "set key outside bottom center horizontal maxrows 2\n",
             column->title, run->begin, run->end - 1);
     chart_events_write(run, out);
     for (uint32_t v = 0; v < STABILITY_VARIANTS; v++) {
