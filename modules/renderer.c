@@ -218,6 +218,15 @@ void *renderer_pass_add(renderer *r, const char *name, size_t state_size, void (
     return state;
 }
 
+uint32_t renderer_entity_key(const renderer *r, entity e)
+{
+    enum { INDEX_MASK = 0xfffff };
+    ecs_iterator it = ecs_iterate(r->world, r->pass_state); // the first pass is the oldest
+    const bool is_later = ecs_next(&it) && (e.id & INDEX_MASK) > (it.entity.id & INDEX_MASK);
+    ecs_iterate_end(&it);
+    return is_later ? e.id - (uint32_t)ecs_count(r->world, r->pass_state) : e.id;
+}
+
 entity renderer_pass_find(const renderer *r, const char *name)
 {
     for (ecs_iterator it = ecs_iterate(r->world, r->pass_state); ecs_next(&it);) {

@@ -125,6 +125,9 @@ typedef struct render_pass {
 void *renderer_pass_add(renderer *r, const char *name, size_t state_size, void (*setup)(renderer *r, void *state),
                         void (*fini)(renderer *r, void *state));
 entity renderer_pass_find(const renderer *r, const char *name); // {0} when there is none
+// An entity's id as if there were no passes, whose entities lie between the scene's and those that came later: a pass
+// more or less must not change random numbers.
+uint32_t renderer_entity_key(const renderer *r, entity e);
 
 // What several modules need to know of the current frame.
 bool renderer_has_vpls(const renderer *r); // settings ask for indirect light by VPLs, and there are VPLs and lights

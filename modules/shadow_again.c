@@ -133,7 +133,7 @@ static bool moved_write(renderer *r, shadow_again *state)
     for (uint32_t i = 0; i < w->instance_count; i++) {
         const mesh_instance_gpu *instance = &w->instance_data[i];
         const uint32_t identity = world_identity(w->order[i].entity);
-        if (memcmp(instance->world, instance->previous_world, sizeof instance->world) != 0)
+        if (world_instance_moved(instance))
             moved[identity / 32] |= 1u << identity % 32;
     }
     return true;

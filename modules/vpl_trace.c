@@ -254,7 +254,8 @@ static void paths_deal(const renderer *r, vpl_trace *state, uint32_t paths)
     vpl_deal_source *sources = memory_alloc(max_u32(w->source_count, 1) * sizeof *sources);
     for (uint32_t i = 0; i < w->source_count; i++) {
         const world_source *s = &w->sources[i];
-        sources[i] = (vpl_deal_source){(uint64_t)s->emissive << 32 | s->entity.id, s->power, s->changed};
+        sources[i] =
+            (vpl_deal_source){(uint64_t)s->emissive << 32 | renderer_entity_key(r, s->entity), s->power, s->changed};
     }
     vpl_deal_update(&state->deal, paths, sources, w->source_count);
     free(sources);

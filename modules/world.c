@@ -368,8 +368,7 @@ static void tlas_instances_write(renderer *r, VkAccelerationStructureInstanceKHR
     }
 }
 
-// Or deformed.
-static bool instance_moved(const mesh_instance_gpu *instance)
+bool world_instance_moved(const mesh_instance_gpu *instance)
 {
     return memcmp(instance->world, instance->previous_world, sizeof instance->world) != 0 ||
            instance->previous_vertex != PREVIOUS_SAME;
@@ -392,7 +391,7 @@ static bool instances_write(renderer *r, bool *emitter_moved)
     memory_reserve((void **)&w->instance_data, &w->state->data_capacity, w->instance_count, sizeof *w->instance_data);
     for (uint32_t i = 0; i < w->instance_count; i++) {
         w->instance_data[i] = instance_make(r, &w->order[i]);
-        const bool moved = instance_moved(&w->instance_data[i]);
+        const bool moved = world_instance_moved(&w->instance_data[i]);
         w->changes.instances |= moved;
         *emitter_moved |= moved && w->state->mesh_emits[w->order[i].mesh];
     }
@@ -462,7 +461,7 @@ static void boxes_move(renderer *r)
 {
     world_gpu *w = r->gpu_world;
     for (uint32_t i = 0; i < w->instance_count; i++) {
-        if (!instance_moved(&w->instance_data[i]))
+        if (!world_instance_moved(&w->instance_data[i]))
             continue;
         const float *previous_world = placement_of(r, &w->order[i]).previous_world;
         const world_deformation *deformation = world_deformation_of(r, w->order[i].mesh);

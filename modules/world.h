@@ -148,6 +148,9 @@ bool world_is_skinned(const renderer *r, uint32_t mesh);
 void world_mesh_triangles(const renderer *r, uint32_t mesh, VkDeviceAddress positions, uint32_t stride,
                           gpu_triangles *geometries);
 
+// Moved or deformed since the last frame.
+bool world_instance_moved(const mesh_instance_gpu *instance);
+
 // ---- Between the world's files.
 bool world_upload(renderer *r); // world_upload.c: what never changes, and materials at first
 // world_materials.c: before all else; at the start and at the end of each extraction.

@@ -86,13 +86,15 @@ static entity lamp_of_scene(renderer *r)
 // Renders a frame; its radiance, RGB. free() it.
 static float *frame_make(renderer *r)
 {
-    static float texels[PIXELS][4];
-    float *radiance = memory_alloc(PIXELS * 3 * sizeof *radiance);
+    const uint32_t pixels = r->settings.width * r->settings.height;
+    float(*texels)[4] = memory_alloc(pixels * sizeof *texels);
+    float *radiance = memory_alloc(pixels * 3 * sizeof *radiance);
     CHECK(renderer_frame(r));
     CHECK(gpu_image_read(device, frame_graph_find_image(r->graph, "radiance"), VK_IMAGE_LAYOUT_TRANSFER_SRC_OPTIMAL,
-                         texels, sizeof texels));
-    for (uint32_t i = 0; i < PIXELS; i++)
+                         texels, pixels * sizeof *texels));
+    for (uint32_t i = 0; i < pixels; i++)
         memcpy(radiance + 3 * i, texels[i], 3 * sizeof(float));
+    free(texels);
     return radiance;
 }
 
@@ -176,6 +178,8 @@ static void switch_check(const char *what, float before, float after)
 {
     render_settings s = settings_small();
     s.only = ONLY_INDIRECT; // direct light is exact, and would hide what lags
+    s.width = 2 * WIDTH; // 384 blocks: of 96 a single one is more than the hundredth that may be off
+    s.height = 2 * HEIGHT;
     float *frames[SETTLING];
     double means[SETTLING], blocks[SETTLING], within[SETTLING];
     fixture f = rooms_create(&s);
@@ -189,7 +193,7 @@ static void switch_check(const char *what, float before, float after)
     frames_skip(f.r, 2 * STILL_SAMPLES);
     float *steady = frame_make(f.r);
     for (uint32_t i = 0; i < SETTLING; i++) {
-        const sequence_distance d = sequence_distance_to(frames[i], steady, WIDTH, HEIGHT);
+        const sequence_distance d = sequence_distance_to(frames[i], steady, s.width, s.height);
         means[i] = d.mean;
         blocks[i] = d.blocks;
         within[i] = d.blocks_within;
