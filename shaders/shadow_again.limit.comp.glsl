@@ -27,18 +27,19 @@ struct sums {
     float count;  // records
     float logarithms; // of now over before, of those that still have light
     float lit;        // how many these are
-    vec3 same;        // of records whose VPL sends what it did: U, the change of S, and the squares of that
+    vec3 same;        // of records of the instance whose VPL sends what it did: U, the change of S, and the squares of that
 };
 
 struct neighbour {
     bool counts; // lies on the same surface, and is known
+    bool same;   // and on the same instance
     float before, now; // what the sample adds to U
     bool seen_before, seen_now;
 };
 
 neighbour neighbour_at(ivec2 stratum, shadow_record center, float footprint)
 {
-    neighbour n = neighbour(false, 0.0, 0.0, false, false);
+    neighbour n = neighbour(false, false, 0.0, 0.0, false, false);
     ivec2 size = ivec2(again_size());
     if (any(lessThan(stratum, ivec2(0))) || any(greaterThanEqual(stratum, size)))
         return n;
@@ -50,6 +51,7 @@ neighbour neighbour_at(ivec2 stratum, shadow_record center, float footprint)
     vec3 normal = octahedral_decode(center.normals.xy);
     n.counts = dot(normal, octahedral_decode(r.normals.xy)) > 0.9 &&
                abs(dot(normal, r.position - center.position)) < footprint;
+    n.same = r.identity == center.identity;
     n.before = r.weight * r.light;
     n.now = r.weight * abs(light_now[index]);
     n.seen_before = r.visible != 0u;
@@ -63,7 +65,7 @@ void add(inout sums sum, neighbour n)
     sum.light += vec4(n.before, seen_before, n.now, seen_now);
     sum.squares += vec3(seen_before * seen_before, seen_before * seen_now, seen_now * seen_now);
     sum.count += 1.0;
-    if (abs(n.now - n.before) < 0.01 * n.before) {
+    if (n.same && abs(n.now - n.before) < 0.01 * n.before) {
         float change = n.before * (float(n.seen_now) - float(n.seen_before));
         sum.same += vec3(n.before, change, change * change);
     }
