@@ -19,6 +19,7 @@ enum {
 static const double ms_high = 1.07, ms_low = 0.93, ms_aim = 0.98; // of target_ms
 static const double error_high = 1.12, error_low = 1 / 1.15, error_aim = 0.98; // of target_error
 static const double gain_needed = 0.9; // of the error, for a change while the time is met
+static const double nearly = 1.2; // off the target by less: changes go a little way
 static const double view_changed = 1.5; // off by so much after it was met: another view, start anew
 static const double error_floor = 0.02; // a scene needs no less
 static const double fit_decay = 0.97; // of what is known of the models' scales, a frame; 0.5 at a change
@@ -293,7 +294,7 @@ static bool traces_in_time(const automatic *a, const render_settings *s)
 static bool is_near(const automatic *a, const render_settings *s)
 {
     const double ms = automatic_milliseconds(a);
-    if (a->changes == 0 || ms > view_changed * a->target_ms || ms * view_changed < a->target_ms)
+    if (a->changes == 0 || ms > nearly * a->target_ms || ms * nearly < a->target_ms)
         return true;
     return fabs(log2((double)s->vpls / a->current.vpls)) <= 2.1 &&
            fabs(log2((double)(s->alpha / a->current.alpha))) <= 0.6;

@@ -210,7 +210,7 @@ TEST(near_the_target_a_change_goes_a_little_way)
     run_frames(&r, &sim, 30);
     CHECK_NEAR(true_milliseconds(&sim, &r.settings) / 250, 1, 0.15);
     const render_settings before = r.settings;
-    sim.speed = 1.4; // calls for a change
+    sim.speed = 1.12; // calls for a change
     for (uint32_t i = 0; i < 100 && choices_equal(&r.settings, &before); i++) {
         r.controller.error_sums[AUTOMATIC_VPL_SET] = 0;
         run_frames(&r, &sim, 1);
