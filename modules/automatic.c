@@ -318,6 +318,13 @@ static bool traces_in_time(const automatic *a, const render_settings *s)
     return s->vpls <= 1000 || a->vpl_scale * model_milliseconds(s, AUTOMATIC_VPLS) <= a->target_ms;
 }
 
+// `s` asks for no more than `other` in any respect.
+static bool is_at_most(const render_settings *s, const render_settings *other)
+{
+    return s->vpls <= other->vpls && s->alpha <= other->alpha && s->interleave >= other->interleave &&
+           rays_of(s) <= rays_of(other);
+}
+
 // Where the time is nearly right a choice goes only a little way from the last: the models are fitted there, and what
 // they say of settings far away is not worth the frames that it takes to find out.
 static bool is_near(const automatic *a, const render_settings *s)
@@ -325,6 +332,10 @@ static bool is_near(const automatic *a, const render_settings *s)
     const double ms = automatic_milliseconds(a);
     if (a->changes == 0 || ms > nearly * a->target_ms || ms * nearly < a->target_ms)
         return true;
+    // Back to the target it only takes, or only gives: what it would trade, it does not know well enough.
+    if ((ms > ms_high * a->target_ms && !is_at_most(s, &a->current)) ||
+        (ms < ms_low * a->target_ms && !is_at_most(&a->current, s)))
+        return false;
     return fabs(log2((double)s->vpls / a->current.vpls)) <= 2.1 &&
            fabs(log2((double)(s->alpha / a->current.alpha))) <= 0.6;
 }
@@ -368,13 +379,6 @@ static render_settings plan_for_time(const automatic *a)
     if (!plan_within(a, ms_aim * a->target_ms, &best))
         plan_within(a, 1.1 * milliseconds_least(a), &best);
     return best;
-}
-
-// `s` asks for no more than `other` in any respect.
-static bool is_at_most(const render_settings *s, const render_settings *other)
-{
-    return s->vpls <= other->vpls && s->alpha <= other->alpha && s->interleave >= other->interleave &&
-           rays_of(s) <= rays_of(other);
 }
 
 // Nothing that asks for no more than what was too little, nothing as dear as what was enough; and VPLs by no more than
