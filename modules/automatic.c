@@ -385,8 +385,12 @@ static render_settings plan_for_time(const automatic *a)
 // a factor of 8 at a time: their noise is hard to measure where it is small, and 61 instead of 100,000 had an error of
 // 0.7. Nor all at once what costs many times as much: the first estimates are noisy, the models crude, and a trial of
 // the dearest settings takes as long as all others together.
-static bool is_candidate(const automatic *a, const render_settings *s)
+// What was too little only gives, and what was more than enough only takes: the models do not know well what trades
+// bring.
+static bool is_candidate(const automatic *a, const render_settings *s, bool more)
 {
+    if (more ? !is_at_most(&a->current, s) : !is_at_most(s, &a->current))
+        return false;
     if (8 * s->vpls < a->current.vpls || s->vpls > 8 * a->current.vpls ||
         model_cost(s) > cost_step * model_cost(&a->current))
         return false;
@@ -410,15 +414,16 @@ static const automatic_trial *cheapest_enough(const automatic *a)
     return best;
 }
 
-// The cheapest candidate that reaches the error. Where there is none, what was enough, or else the least error.
-static render_settings plan_for_error(const automatic *a)
+// The cheapest candidate that reaches the error, and asks for `more` or for less than the current settings. Where there
+// is none, what was enough, or else the least error.
+static render_settings plan_for_error(const automatic *a, bool more)
 {
     const automatic_trial *enough = cheapest_enough(a);
     render_settings best = enough ? enough->settings : a->current;
     double best_score = INFINITY;
     for (uint32_t i = 0; i < CHOICES && a->trial_count < AUTOMATIC_TRIALS; i++) {
         const render_settings s = choice_of(&a->current, i);
-        if (!is_candidate(a, &s))
+        if (!is_candidate(a, &s, more))
             continue;
         const double error = automatic_predict_error(a, &s);
         const bool reaches = error <= error_aim * a->target_error;
@@ -547,7 +552,7 @@ static bool step_for_error(automatic *a)
     const bool high = error > error_high * target, low = error < error_low * target;
     if (a->trial_count < AUTOMATIC_TRIALS)
         a->trials[a->trial_count++] = (automatic_trial){a->current, a->probes, !high};
-    const render_settings next = plan_for_error(a);
+    const render_settings next = plan_for_error(a, high);
     a->settled = (!high && !low) || choices_equal(&next, &a->current);
     if (a->settled)
         return false;
