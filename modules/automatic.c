@@ -21,6 +21,7 @@ static const double error_high = 1.12, error_low = 1 / 1.15, error_aim = 0.98; /
 static const double gain_needed = 0.9; // of the error, for a change while the time is met
 static const double nearly = 1.2; // off the target by less: changes go a little way
 static const double view_changed = 1.5; // off by so much after it was met: another view, start anew
+static const double cost_step = 3; // towards an error, of the modelled time
 static const double error_floor = 0.02; // a scene needs no less
 static const double fit_decay = 0.97; // of what is known of the models' scales, a frame; 0.5 at a change
 
@@ -98,7 +99,9 @@ static double model_error(const render_settings *s, automatic_part part)
         // In small pictures 4x4 tiles, filtered across edges, take several times the error of none.
         return 0.01 / (alpha * alpha * sqrt(alpha)) * (1 + 0.15 * (s->interleave * s->interleave - 1));
     case AUTOMATIC_SHADOW_RATIO:
-        return 0.01 * (0.6 + 0.4 / rays_of(s)); // most is bias, of which no ray takes any
+        // Measured against path tracing, 128x72, indirect light, cornell and atrium: alpha 2 takes 0.35 and 0.66 of it,
+        // four rays 0.92 and 0.86, as most is bias; 2x2 tiles add 0.16 (alpha 4: 0.3) and 0.6 of it.
+        return 0.01 * ((0.8 + 0.2 / rays_of(s)) / alpha + 0.1 * (s->interleave * s->interleave - 1));
     case AUTOMATIC_VPL_SET:
     case AUTOMATIC_PARTS:
         return 10.0 / fmax(1, s->vpls);
@@ -158,26 +161,52 @@ static uint32_t window_length(const automatic *a)
     return a->age <= TIME_TRANSIENT ? 0 : min_u32(a->age - TIME_TRANSIENT, AUTOMATIC_WINDOW);
 }
 
-static double median(const double *values, uint32_t count)
+static void sort(const double *values, uint32_t count, double sorted[AUTOMATIC_WINDOW])
 {
-    double sorted[AUTOMATIC_WINDOW];
     for (uint32_t i = 0; i < count; i++) {
         uint32_t place = i;
         for (; place > 0 && sorted[place - 1] > values[i]; place--)
             sorted[place] = sorted[place - 1];
         sorted[place] = values[i];
     }
+}
+
+static double median(const double *values, uint32_t count)
+{
+    double sorted[AUTOMATIC_WINDOW];
+    sort(values, count, sorted);
     return count == 0 ? 0 : 0.5 * (sorted[(count - 1) / 2] + sorted[count / 2]);
+}
+
+// Of the frames in the window; returns how many.
+static uint32_t frame_times(const automatic *a, double times[AUTOMATIC_WINDOW])
+{
+    const uint32_t length = window_length(a);
+    for (uint32_t i = 0; i < length; i++) {
+        times[i] = 0;
+        for (automatic_group group = 0; group < AUTOMATIC_GROUPS; group++)
+            times[i] += a->window[group][i];
+    }
+    return length;
 }
 
 double automatic_milliseconds(const automatic *a)
 {
-    double sums[AUTOMATIC_WINDOW] = {0};
-    const uint32_t length = window_length(a);
-    for (uint32_t i = 0; i < length; i++)
-        for (automatic_group group = 0; group < AUTOMATIC_GROUPS; group++)
-            sums[i] += a->window[group][i];
-    return median(sums, length);
+    double times[AUTOMATIC_WINDOW];
+    const uint32_t length = frame_times(a, times);
+    return median(times, length);
+}
+
+// Standard error of that median, as for normal times, by the middle half of the window: a few slow frames do not count.
+static double milliseconds_error(const automatic *a)
+{
+    double times[AUTOMATIC_WINDOW], sorted[AUTOMATIC_WINDOW];
+    const uint32_t length = frame_times(a, times);
+    if (length < TIME_FRAMES)
+        return INFINITY;
+    sort(times, length, sorted);
+    const double deviation = (sorted[length - 1 - length / 4] - sorted[length / 4]) / 1.35;
+    return 1.25 * deviation / sqrt(length);
 }
 
 // Where nothing moves, VPLs are traced and built after changes only, and the median frame tells nothing of it.
@@ -289,6 +318,13 @@ static bool traces_in_time(const automatic *a, const render_settings *s)
     return s->vpls <= 1000 || a->vpl_scale * model_milliseconds(s, AUTOMATIC_VPLS) <= a->target_ms;
 }
 
+// `s` asks for no more than `other` in any respect.
+static bool is_at_most(const render_settings *s, const render_settings *other)
+{
+    return s->vpls <= other->vpls && s->alpha <= other->alpha && s->interleave >= other->interleave &&
+           rays_of(s) <= rays_of(other);
+}
+
 // Where the time is nearly right a choice goes only a little way from the last: the models are fitted there, and what
 // they say of settings far away is not worth the frames that it takes to find out.
 static bool is_near(const automatic *a, const render_settings *s)
@@ -296,6 +332,10 @@ static bool is_near(const automatic *a, const render_settings *s)
     const double ms = automatic_milliseconds(a);
     if (a->changes == 0 || ms > nearly * a->target_ms || ms * nearly < a->target_ms)
         return true;
+    // Back to the target it only takes, or only gives: what it would trade, it does not know well enough.
+    if ((ms > ms_high * a->target_ms && !is_at_most(s, &a->current)) ||
+        (ms < ms_low * a->target_ms && !is_at_most(&a->current, s)))
+        return false;
     return fabs(log2((double)s->vpls / a->current.vpls)) <= 2.1 &&
            fabs(log2((double)(s->alpha / a->current.alpha))) <= 0.6;
 }
@@ -341,19 +381,18 @@ static render_settings plan_for_time(const automatic *a)
     return best;
 }
 
-// `s` asks for no more than `other` in any respect.
-static bool is_at_most(const render_settings *s, const render_settings *other)
-{
-    return s->vpls <= other->vpls && s->alpha <= other->alpha && s->interleave >= other->interleave &&
-           rays_of(s) <= rays_of(other);
-}
-
 // Nothing that asks for no more than what was too little, nothing as dear as what was enough; and VPLs by no more than
 // a factor of 8 at a time: their noise is hard to measure where it is small, and 61 instead of 100,000 had an error of
-// 0.7.
-static bool is_candidate(const automatic *a, const render_settings *s)
+// 0.7. Nor all at once what costs many times as much: the first estimates are noisy, the models crude, and a trial of
+// the dearest settings takes as long as all others together.
+// What was too little only gives, and what was more than enough only takes: the models do not know well what trades
+// bring.
+static bool is_candidate(const automatic *a, const render_settings *s, bool more)
 {
-    if (8 * s->vpls < a->current.vpls || s->vpls > 8 * a->current.vpls)
+    if (more ? !is_at_most(&a->current, s) : !is_at_most(s, &a->current))
+        return false;
+    if (8 * s->vpls < a->current.vpls || s->vpls > 8 * a->current.vpls ||
+        model_cost(s) > cost_step * model_cost(&a->current))
         return false;
     for (uint32_t i = 0; i < a->trial_count; i++) {
         const automatic_trial *trial = &a->trials[i];
@@ -375,15 +414,16 @@ static const automatic_trial *cheapest_enough(const automatic *a)
     return best;
 }
 
-// The cheapest candidate that reaches the error. Where there is none, what was enough, or else the least error.
-static render_settings plan_for_error(const automatic *a)
+// The cheapest candidate that reaches the error, and asks for `more` or for less than the current settings. Where there
+// is none, what was enough, or else the least error.
+static render_settings plan_for_error(const automatic *a, bool more)
 {
     const automatic_trial *enough = cheapest_enough(a);
     render_settings best = enough ? enough->settings : a->current;
     double best_score = INFINITY;
     for (uint32_t i = 0; i < CHOICES && a->trial_count < AUTOMATIC_TRIALS; i++) {
         const render_settings s = choice_of(&a->current, i);
-        if (!is_candidate(a, &s))
+        if (!is_candidate(a, &s, more))
             continue;
         const double error = automatic_predict_error(a, &s);
         const bool reaches = error <= error_aim * a->target_error;
@@ -421,7 +461,7 @@ static void change(automatic *a, const render_settings *next, const char *why)
     a->current = *next;
     a->age = 0;
     a->changes++;
-    a->settled = false;
+    a->met = a->settled = false;
     a->probes = (automatic_probes){0};
     fit_scale(a, 0.5);
 }
@@ -454,19 +494,35 @@ static uint32_t frames_needed(const automatic *a, double ms)
     return TIME_TRANSIENT + (met && a->changes > 0 ? SETTLED_AGE : frames);
 }
 
-static bool step_for_time(automatic *a)
+// Patience is for changes that miss the target, to this side and that. Where the last one met it and the time surely
+// left it since, or did not go far enough, what is seen changes, as along a camera's way: that is followed.
+static void drift_follow(automatic *a)
 {
-    const double ms = automatic_milliseconds(a), target = a->target_ms;
+    const double ms = automatic_milliseconds(a), target = a->target_ms, noise = 2 * milliseconds_error(a);
+    if (window_length(a) < TIME_FRAMES)
+        return;
+    if (ms <= ms_high * target && ms >= ms_low * target)
+        a->met = true;
+    const bool slow = ms - noise > ms_high * target, fast = ms + noise < ms_low * target;
+    if ((slow && (a->met || a->aim < 0)) || (fast && (a->met || a->aim > 0)))
+        a->changes = min_u32(a->changes, PATIENT_CHANGES);
     if (a->settled && (ms > view_changed * target || ms * view_changed < target))
         a->changes = 0;
+}
+
+static bool step_for_time(automatic *a)
+{
+    drift_follow(a);
+    const double ms = automatic_milliseconds(a), target = a->target_ms;
     a->settled = a->age >= SETTLED_AGE;
     if (a->age < patience(a, frames_needed(a, ms)) || a->age % 2 == 1)
         return false;
     const render_settings next = plan_for_time(a);
     if (!is_worth_it(a, &next, ms) || choices_equal(&next, &a->current))
         return false;
+    a->aim = ms > ms_high * target ? -1 : ms < ms_low * target ? 1 : 0;
     char why[96];
-    if (ms > ms_high * target || ms < ms_low * target)
+    if (a->aim != 0)
         snprintf(why, sizeof why, "%.0f ms are %s than %g", ms, ms > target ? "more" : "less", target);
     else
         snprintf(why, sizeof why, "the same time has less error than %.3f", automatic_error(a, NULL));
@@ -496,7 +552,7 @@ static bool step_for_error(automatic *a)
     const bool high = error > error_high * target, low = error < error_low * target;
     if (a->trial_count < AUTOMATIC_TRIALS)
         a->trials[a->trial_count++] = (automatic_trial){a->current, a->probes, !high};
-    const render_settings next = plan_for_error(a);
+    const render_settings next = plan_for_error(a, high);
     a->settled = (!high && !low) || choices_equal(&next, &a->current);
     if (a->settled)
         return false;

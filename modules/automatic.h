@@ -18,7 +18,8 @@
 // The models are crude; their scales are fitted to what is measured with the settings in use, so that a choice made
 // from them is corrected by the next measurement. It changes nothing while the target is met but for a clear gain,
 // never before the frames since the last change tell enough, and waits longer after each change: so it cannot
-// oscillate. With a target error nothing depends on time: the same scene takes the same way.
+// oscillate. But a time that was met and then left, as along a camera's way, is followed without that wait. With a
+// target error nothing depends on time: the same scene takes the same way.
 #pragma once
 
 #include "settings.h"
@@ -73,6 +74,8 @@ typedef struct automatic {
     uint32_t frame; // steps so far
     uint32_t age; // frames measured since the last change
     uint32_t changes; // since the start, or since the view changed
+    bool met; // target_ms: at some time since the last change
+    int aim; // target_ms: of the last change: 1: at longer frames, -1: at shorter ones, 0: at less error
     bool settled; // the target is met, or cannot be met better, and long enough since
     double window[AUTOMATIC_GROUPS][AUTOMATIC_WINDOW]; // ring by age
     double time_scales[AUTOMATIC_GROUPS]; // measured over model; 0: not measured yet
