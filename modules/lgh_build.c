@@ -185,7 +185,7 @@ static void sort_list(const frame_graph_context *context, const lgh_build *b, lg
         const uint32_t scan[] = {0, follow};
         const size_t blocks = STATE_DISPATCH(sort) + follow * sizeof(lgh_dispatch);
         by_state(context, b, SORT_COUNT, &follow, 4, blocks);
-        dispatch(context, b->pipelines[SCAN_LIST], scan, sizeof scan, 1);
+        by_state(context, b, SCAN_LIST, scan, sizeof scan, blocks);
         by_state(context, b, SORT_SCATTER, &follow, 4, blocks);
     }
 }
@@ -206,7 +206,7 @@ static void execute_merge(const frame_graph_context *context, void *user)
     const uint32_t scan[] = {1, 0};
     gpu_memory_barrier(context->commands);
     by_state(context, b, MERGE_COUNT, NULL, 0, STATE_DISPATCH(runs));
-    dispatch(context, b->pipelines[SCAN_LIST], scan, sizeof scan, 1);
+    by_state(context, b, SCAN_LIST, scan, sizeof scan, STATE_DISPATCH(runs));
     by_state(context, b, MERGE, NULL, 0, STATE_DISPATCH(runs));
 }
 

@@ -11,8 +11,10 @@ layout(push_constant, scalar) uniform push_block {
 
 void main()
 {
+    if (gl_WorkGroupID.x > 0u)
+        return; // the dispatch is that of the steps before and after, which may be none
     if (push.merge != 0u)
-        scan(state.runs.x > 0u ? merge_runs(state.last_count) : 0u);
+        scan(merge_runs(state.last_count));
     else
-        scan(state.sort[push.follow].x > 0u ? sort_blocks(state.listed) << LGH_SORT_BITS : 0u);
+        scan(sort_blocks(state.listed) << LGH_SORT_BITS);
 }
