@@ -82,12 +82,17 @@ shadow_sample grid_sample(uint index, gbuffer_point p, uint random)
     grid_light light = grid_lights[index];
     uint c = light_exponent(header, index);
     uint lowest = push.start_level == 0u ? header.level_count : header.level_count - 1u;
-    float scale = lgh_blend(blend_kind(c, lowest), distance(light.position, p.position), header.levels[c].radius);
-    scale *= dealt_factor(header.levels[c].occupied);
+    uint kind = blend_kind(c, lowest);
+    float radius = header.levels[c].radius, dealt = dealt_factor(header.levels[c].occupied);
+    float blend = lgh_blend(kind, distance(light.position, p.position), radius);
     vec3 sent = grid_light_sent(light, light.position, push.emission, p, push.singularity);
     shadow_sample s;
-    s.centre_light = scale * sent;
-    s.end_light = scale * end_point_light(light, index, c, sent, p, random, s.end, s.slot);
+    s.centre_light = dealt * blend * sent;
+    s.end_light = end_point_light(light, index, c, sent, p, random, s.end, s.slot);
+    // The centres' shares count what is near twice, in the level below and under centres that lie farther away (a light
+    // half a metre from a wall under lanterns 2.2 times, one at 12 m 0.9 times), and what is near is seen more often. The
+    // end points' own shares do not, but rare samples would weigh without bound; the variance of the mean is bounded.
+    s.end_light *= dealt * sqrt(blend * lgh_blend(kind, distance(s.end, p.position), radius));
     return s;
 }
 

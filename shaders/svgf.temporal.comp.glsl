@@ -114,6 +114,9 @@ float agreement(surroundings around, accumulated before, vec2 means_before)
     // The larger of what the pixel showed over time and of what the pixels around show now: either is too small by chance.
     vec2 variance = max(svgf_variance(luminance(before.unshadowed), luminance(before.shadowed), before.moments.xyz),
                         svgf_variance(around.means.x, around.means.y, around.moments));
+    // Nor do n frames that were all lit rule out a shadow in the next (rule of succession: p = (n + 1) / (n + 2)).
+    float n = before.moments.w;
+    variance.x = max(variance.x, (n + 1.0) / ((n + 2.0) * (n + 2.0)));
     variance *= (1.0 + 1.0 / svgf_frames(before.moments.w)) / around.count;
     // Nothing now may be chance, where few samples find light.
     vec2 off = vec2(0.0, log(max(around.means.x / means_before.x, 0.01)));
@@ -131,7 +134,8 @@ accumulated accumulate(ivec2 pixel, gbuffer_point point, surroundings around)
         return is_sampled(pixel) ? now : accumulated(vec3(0.0), vec3(0.0), vec4(0.0));
     vec2 means_before;
     accumulated before = history(r, means_before);
-    float kept = before.moments.w * (around.count > 0.0 ? agreement(around, before, means_before) : 1.0);
+    // One sample alone proves nothing: of a thing as small as a pixel, lit nearly by one light, a rare other one is no change.
+    float kept = before.moments.w * (around.count > 1.5 ? agreement(around, before, means_before) : 1.0);
     if (push.has_limit != 0u)
         kept = min(kept, again_limit(limit_map, reprojection_place(uvec2(pixel))));
     if (!is_sampled(pixel))

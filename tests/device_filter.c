@@ -612,6 +612,29 @@ TEST(change_of_light_leaves_no_lag)
     CHECK(dimmer <= 2 && brighter <= 2 && shadow <= 4 && sharp <= 2);
 }
 
+// Of a thing as small as a pixel, under one light that is seen and another that is not and rarely sampled.
+TEST(one_sample_of_another_light_leaves_the_history_of_a_pixel)
+{
+    stage *s = stage_create(48, 48);
+    for (uint32_t i = 0; i < 48 * 48; i++) // no two neighbours on one surface
+        s->view_z[i] = (float)(10 << (2 * (i % 48 % 2) + 4 * (i / 48 % 2)));
+    for (int frame = 0; frame < 9; frame++) {
+        for (uint32_t i = 0; i < 48 * 48; i++) {
+            const bool rare = frame == 8 && i % 7 == 0;
+            const float u = rare ? 0.5f : 1, visible = rare ? 0 : 1;
+            texel_set(in_u[i], u, u, u);
+            texel_set(in_s[i], visible, visible, visible);
+        }
+        filter_frame(s, in_u, in_s, out_u, out_s);
+    }
+    double lowest = 1;
+    for (uint32_t i = 0; i < 48 * 48; i++)
+        lowest = fmin(lowest, (double)(out_s[i][0] / out_u[i][0]));
+    printf("  lowest ratio %.3f\n", lowest);
+    CHECK(lowest > 0.9);
+    stage_destroy(s);
+}
+
 // Lit on the left, shadowed on the right: what the two sides have become.
 static void edge_check(stage *s)
 {
@@ -781,6 +804,7 @@ int main(void)
     RUN(history_ends_where_another_instance_appears);
     RUN(history_of_a_still_picture_grows_and_then_holds);
     RUN(change_of_light_leaves_no_lag);
+    RUN(one_sample_of_another_light_leaves_the_history_of_a_pixel);
     RUN(pixels_without_a_sample_keep_their_history);
     RUN(filter_stops_at_a_step_in_depth);
     RUN(filter_stops_at_an_edge_between_walls);

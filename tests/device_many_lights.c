@@ -79,17 +79,32 @@ static render_settings floor_settings(void)
     return s;
 }
 
-static renderer *floor_create(const render_settings *settings)
+// A lid that lets nothing through, and that the camera above sees through: it shows its back.
+static void lid_add(float height)
+{
+    const float matrix[16] = {5, 0, 0, 0, 0, -5, 0, 0, 0, 0, -1, 0, 0, 0, height, 1};
+    quad_add(&floor_quad, matrix);
+}
+
+// `lid`: metres over the floor, see lid_add; 0: none.
+static renderer *floor_create_with(const render_settings *settings, float lid)
 {
     static const float matrix[16] = {5, 0, 0, 0, 0, 5, 0, 0, 0, 0, 5, 0, 0, 0, 0, 1};
     quad_scene_init(&floor_quad);
     memcpy(quad_add(&floor_quad, matrix)->base_color, (float[4]){0, 0, 0, 1}, 4 * sizeof(float));
+    if (lid > 0)
+        lid_add(lid);
     renderer *r = renderer_create(devices[0], &floor_quad.data, settings);
     if (!r)
         exit(EXIT_FAILURE);
     r->camera =
         (render_camera){.eye = {0, 0, 10}, .up = {0, 1, 0}, .yfov = 2 * atanf((float)reach / 10), .near_plane = 0.01f};
     return r;
+}
+
+static renderer *floor_create(const render_settings *settings)
+{
+    return floor_create_with(settings, 0);
 }
 
 static void lights_scatter(renderer *r, lights *l, uint32_t count, float low, float high)
@@ -108,12 +123,14 @@ static void floor_point(uint32_t pixel, double point[3])
     point[2] = 0;
 }
 
-// What a white floor would send out, nits: I cos / (pi d^2), summed.
-static double floor_light(const lights *l, const double point[3], int channel)
+// What a white floor would send out, nits: I cos / (pi d^2), summed over the lights below a height.
+static double floor_light(const lights *l, const double point[3], double height, int channel)
 {
     double sum = 0;
     for (uint32_t i = 0; i < l->count; i++) {
         double square = 0;
+        if ((double)l->all[i].position[2] >= height)
+            continue;
         for (int k = 0; k < 3; k++)
             square += (l->all[i].position[k] - point[k]) * (l->all[i].position[k] - point[k]);
         sum += l->all[i].candela[channel] * l->all[i].position[2] / (square * sqrt(square));
@@ -138,6 +155,14 @@ static float *frame_image(renderer *r, const char *name)
     r->export_count = 1;
     CHECK(renderer_frame(r));
     return image_read(r, name);
+}
+
+static double mean_of(const float *image, size_t pixels)
+{
+    double sum = 0;
+    for (size_t i = 0; i < 4 * pixels; i++)
+        sum += i % 4 < 3 ? image[i] : 0;
+    return sum / (3 * (double)pixels);
 }
 
 typedef struct comparison {
@@ -180,7 +205,7 @@ static void check_level_0(uint32_t lighting)
         double point[3];
         floor_point(i, point);
         for (int c = 0; c < 3; c++) {
-            const double expected = floor_light(&scattered, point, c);
+            const double expected = floor_light(&scattered, point, 1e9, c);
             worst = fmax(worst, fabs(image[4 * i + c] - expected) / expected);
         }
     }
@@ -218,7 +243,7 @@ TEST(the_hierarchy_of_lights_converges_to_their_sum)
     static const struct {
         float alpha;
         double error, energy;
-    } rows[] = {{1, 0.18, 0.18}, {2, 0.04, 0.035}, {4, 0.01, 0.01}};
+    } rows[] = {{1, 0.16, 0.155}, {2, 0.034, 0.032}, {4, 0.008, 0.008}};
     for (size_t i = 0; i < countof(rows); i++) {
         render_settings s = floor_settings();
         s.alpha = rows[i].alpha;
@@ -226,6 +251,49 @@ TEST(the_hierarchy_of_lights_converges_to_their_sum)
         printf("  4000 lights, alpha %g: error %.4f, energy %.4f\n", (double)s.alpha, c.error, c.energy);
         CHECK(c.error < rows[i].error);
         CHECK_NEAR(c.energy, 1, rows[i].energy);
+    }
+}
+
+// U and S over all pixels and `frames` frames; their ratio.
+static double ratio_over_frames(renderer *r, uint32_t frames)
+{
+    double sums[2] = {0};
+    for (uint32_t frame = 0; frame < frames; frame++) {
+        r->exports[0] = "shadow_u";
+        r->exports[1] = "shadow_s";
+        r->export_count = 2;
+        CHECK(renderer_frame(r));
+        for (uint32_t which = 0; which < 2; which++) {
+            float *image = image_read(r, r->exports[which]);
+            sums[which] += mean_of(image, SIDE * SIDE);
+            free(image);
+        }
+    }
+    return sums[1] / sums[0];
+}
+
+// The lights under a lid are seen and those above are not. What is near must not count more in the ratio than it does
+// in the light (with the centres' shares as weights the ratio is 1.42 and 1.23 times the share of the light that is
+// seen).
+TEST(shadows_weigh_near_lights_as_far_ones)
+{
+    static const float lids[] = {0.8f, 1.6f};
+    for (size_t i = 0; i < countof(lids); i++) {
+        render_settings s = floor_settings();
+        s.shadow_samples = 8;
+        renderer *r = floor_create_with(&s, lids[i]);
+        lights_scatter(r, &scattered, 4000, 0.2f, 3);
+        double seen = 0, all = 0;
+        for (uint32_t pixel = 0; pixel < SIDE * SIDE; pixel += 5) {
+            double point[3];
+            floor_point(pixel, point);
+            all += floor_light(&scattered, point, 1e9, 0);
+            seen += floor_light(&scattered, point, (double)lids[i], 0);
+        }
+        const double ratio = ratio_over_frames(r, 8);
+        printf("  lid at %.1f m: ratio %.4f, of the light %.4f are seen\n", (double)lids[i], ratio, seen / all);
+        CHECK_NEAR(ratio / (seen / all), 1, 0.13); // 1.111 and 1.107
+        renderer_destroy(r);
     }
 }
 
@@ -324,14 +392,6 @@ static renderer *renderer_of(gpu *device, const scene_data *scene, const render_
     if (!r)
         exit(EXIT_FAILURE);
     return r;
-}
-
-static double mean_of(const float *image, size_t pixels)
-{
-    double sum = 0;
-    for (size_t i = 0; i < 4 * pixels; i++)
-        sum += i % 4 < 3 ? image[i] : 0;
-    return sum / (3 * (double)pixels);
 }
 
 static void room_lights_spawn(renderer *r, lights *l, uint32_t count)
@@ -651,6 +711,7 @@ int main(void)
     }
     RUN(lights_over_a_floor_sum_up_as_they_should);
     RUN(the_hierarchy_of_lights_converges_to_their_sum);
+    RUN(shadows_weigh_near_lights_as_far_ones);
     RUN(interleaved_tiles_share_the_lights_out);
     RUN(emission_models_agree_on_lights);
     RUN(a_light_that_touches_a_pixel_neither_glares_nor_breaks);
