@@ -43,7 +43,7 @@
 //   X_ratio_now        RGBA16F       S / U in [0,1]; a: standard deviation left        svgf; taa where unfiltered
 //   X_ratio            RGBA16F       the same after TAA, where it is on; a: frames     taa
 //   shadow_steadied    RGBA32F       with --taa light, in place of shadow_ratio: light after shadows and TAA; a: frames
-//   shadow_records, shadow_limit     samples to trace again: see modules/shadow_again.h              shadow_again
+//   shadow_records, shadow_lag, shadow_limit  where the history holds: see modules/shadow_again.h    shadow_again
 //   radiance           RGBA32F       nits                    composite; progressive for the other methods
 //   aov_direct, aov_indirect  RGBA32F  their parts of `radiance`, when exported, lgh alone  composite
 //   sums_before, sums  vec4[2][pixels]  the references' light before and after this frame; see progressive.h

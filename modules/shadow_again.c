@@ -8,17 +8,18 @@
 
 #include <string.h>
 
-// As shadow_record in shaders/shadow_again.glsl.h.
-enum { SIDE = 4, RECORD_SIZE = 15 * 4, MOVED_WORDS = WORLD_IDENTITIES / 32 + 1 };
+// As shadow_record and shadow_lag in shaders/shadow_again.glsl.h.
+enum { SIDE = 4, RECORD_SIZE = 15 * 4, LAG_SIZE = 6 * 4, MOVED_WORDS = WORLD_IDENTITIES / 32 + 1 };
 
 typedef struct shadow_again {
-    gpu_pipeline record, hold, rays, limit;
+    gpu_pipeline record, hold, lag, rays, limit;
     gpu_buffer moved; // host: a bit for each identity whose instance moved
 } shadow_again;
 
 typedef struct again_pass {
     gpu_pipeline pipeline;
     uint32_t columns, rows; // strata
+    bool traced, has_lags; // limit
     struct {
         uint32_t slot_count;
         float singularity;
@@ -54,7 +55,16 @@ static void rays_execute(const frame_graph_context *context, void *user)
 static void limit_execute(const frame_graph_context *context, void *user)
 {
     const again_pass *args = user;
-    const uint32_t history_valid = frame_graph_history_valid(context, "shadow_limit");
+    const uint32_t push[] = {frame_graph_history_valid(context, "shadow_limit"), args->traced, args->has_lags};
+    frame_graph_bind(context, args->pipeline);
+    gpu_push(context->commands, push, sizeof push);
+    gpu_dispatch(context->commands, div_up_u32(args->columns, PIXEL_GROUP_WIDTH), args->rows, 1);
+}
+
+static void lag_execute(const frame_graph_context *context, void *user)
+{
+    const again_pass *args = user;
+    const uint32_t history_valid = frame_graph_history_valid(context, "shadow_lag");
     frame_graph_bind(context, args->pipeline);
     gpu_push(context->commands, &history_valid, sizeof history_valid);
     gpu_dispatch(context->commands, div_up_u32(args->columns, PIXEL_GROUP_WIDTH), args->rows, 1);
@@ -111,13 +121,38 @@ static void hold_declare(renderer *r, const shadow_again *state)
     records_create(p, "shadow_records", &args);
 }
 
-// ---- Tracing
+static void lag_declare(renderer *r, const shadow_again *state)
+{
+    static const char *const images[] = {"shadow_u", "shadow_s", "shadow_u_accumulated", "shadow_s_accumulated",
+                                         "shadow_moments"};
+    const again_pass args = pass_of(r, state->lag);
+    frame_graph_pass *p = pass_add(r, "shadow_again/lag", true, &args, lag_execute);
+    for (size_t i = 0; i < countof(images); i++)
+        frame_graph_read(p, images[i], ACCESS_STORAGE_READ);
+    frame_graph_read(p, "motion", ACCESS_SAMPLED);
+    frame_graph_read_previous(p, "shadow_lag", ACCESS_STORAGE_READ);
+    const frame_graph_resource_desc lags = frame_graph_buffer_of((uint64_t)args.columns * args.rows * LAG_SIZE);
+    frame_graph_create_resource(p, "shadow_lag", &lags, ACCESS_STORAGE_WRITE);
+}
+
+// ---- The limit
+
+// Whether samples are traced again in this frame.
+static bool is_traced(const renderer *r)
+{
+    const world_changes *changes = &r->gpu_world->changes;
+    return changes->sources || changes->bounds || changes->box_count > 0;
+}
+
+static bool has_lags(const renderer *r)
+{
+    return frame_graph_has_history(r->graph, "shadow_lag") && !renderer_is_settled(r);
+}
 
 const char *shadow_again_limit(const renderer *r)
 {
-    const world_changes *changes = &r->gpu_world->changes;
-    const bool changed = changes->sources || changes->bounds || changes->box_count > 0;
-    return renderer_has_shadows(r) && r->frame > 0 && changed && frame_graph_has_history(r->graph, "shadow_records")
+    return renderer_has_shadows(r) && r->frame > 0 && (is_traced(r) || has_lags(r)) &&
+                   frame_graph_has_history(r->graph, "shadow_records")
                ? "shadow_limit"
                : NULL;
 }
@@ -139,9 +174,9 @@ static bool moved_write(renderer *r, shadow_again *state)
     return true;
 }
 
-static void trace_declare(renderer *r, const shadow_again *state)
+static void rays_declare(renderer *r, const shadow_again *state)
 {
-    again_pass args = pass_of(r, state->rays);
+    const again_pass args = pass_of(r, state->rays);
     const uint32_t count = args.columns * args.rows;
     frame_graph_import_buffer(r->graph, "shadow_moved", state->moved, ACCESS_HOST_WRITE, ACCESS_NONE);
     frame_graph_pass *rays = pass_add(r, "shadow_again/rays", false, &args, rays_execute);
@@ -152,15 +187,25 @@ static void trace_declare(renderer *r, const shadow_again *state)
     const frame_graph_resource_desc light = frame_graph_buffer_of(count * sizeof(float));
     frame_graph_create_resource(rays, "shadow_again_light", &light, ACCESS_STORAGE_WRITE);
     rays_trace(r, "shadow_again", RAYS_VISIBLE, count);
+}
 
-    args.pipeline = state->limit;
+// What is absent has something else stand in, unread.
+static void limit_declare(renderer *r, const shadow_again *state)
+{
+    again_pass args = pass_of(r, state->limit);
+    args.traced = is_traced(r);
+    args.has_lags = has_lags(r);
     frame_graph_pass *limit = pass_add(r, "shadow_again/limit", false, &args, limit_execute);
     frame_graph_read_previous(limit, "shadow_records", ACCESS_STORAGE_READ);
-    frame_graph_read(limit, "shadow_again_light", ACCESS_STORAGE_READ);
-    frame_graph_read(limit, "shadow_again_visible", ACCESS_STORAGE_READ);
+    frame_graph_read(limit, args.traced ? "shadow_again_light" : "lgh_header", ACCESS_STORAGE_READ);
+    frame_graph_read(limit, args.traced ? "shadow_again_visible" : "lgh_header", ACCESS_STORAGE_READ);
     const frame_graph_resource_desc image = frame_graph_image_of(VK_FORMAT_R32G32_SFLOAT, args.columns, args.rows);
     frame_graph_create_resource(limit, "shadow_limit", &image, ACCESS_STORAGE_WRITE);
     frame_graph_read_previous(limit, "shadow_limit", ACCESS_SAMPLED);
+    if (args.has_lags)
+        frame_graph_read_previous(limit, "shadow_lag", ACCESS_STORAGE_READ);
+    else
+        frame_graph_read(limit, "lgh_header", ACCESS_STORAGE_READ);
 }
 
 // ---- The module
@@ -174,11 +219,17 @@ static void shadow_again_setup(renderer *r, void *user)
         hold_declare(r, state);
     else
         record_declare(r, state);
+    if (r->settings.filter && !renderer_is_settled(r))
+        lag_declare(r, state);
     if (!shadow_again_limit(r))
         return;
-    r->failed |= !moved_write(r, state);
+    if (is_traced(r)) {
+        r->failed |= !moved_write(r, state);
+        if (!r->failed)
+            rays_declare(r, state);
+    }
     if (!r->failed)
-        trace_declare(r, state);
+        limit_declare(r, state);
 }
 
 static void shadow_again_fini(renderer *r, void *user)
@@ -186,6 +237,7 @@ static void shadow_again_fini(renderer *r, void *user)
     const shadow_again *state = user;
     gpu_pipeline_destroy(r->gpu, state->record);
     gpu_pipeline_destroy(r->gpu, state->hold);
+    gpu_pipeline_destroy(r->gpu, state->lag);
     gpu_pipeline_destroy(r->gpu, state->rays);
     gpu_pipeline_destroy(r->gpu, state->limit);
     gpu_buffer_destroy(r->gpu, state->moved);
@@ -202,7 +254,8 @@ bool shadow_again_init(renderer *r)
         renderer_pass_add(r, "shadow_again", sizeof(shadow_again), shadow_again_setup, shadow_again_fini);
     state->record = pipeline_of(r, &shader_shadow_again_record_comp);
     state->hold = pipeline_of(r, &shader_shadow_again_hold_comp);
+    state->lag = pipeline_of(r, &shader_shadow_again_lag_comp);
     state->rays = pipeline_of(r, &shader_shadow_again_rays_comp);
     state->limit = pipeline_of(r, &shader_shadow_again_limit_comp);
-    return state->record.id && state->hold.id && state->rays.id && state->limit.id;
+    return state->record.id && state->hold.id && state->lag.id && state->rays.id && state->limit.id;
 }

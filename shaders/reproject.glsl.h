@@ -43,33 +43,61 @@ float object_motion(vec3 position, vec2 place)
 // A pixel's place in the last frame.
 vec2 reprojection_place(uvec2 pixel) { return vec2(pixel) + texelFetch(motion_map, ivec2(pixel), 0).xy; }
 
+// What a pixel's surface is known by in the last frame.
+struct reprojection_surface {
+    vec3 position, normal; // geometric
+    float identity;
+    float tolerance; // metres off its plane
+};
+
+bool shows_surface(ivec2 tap, reprojection_surface s)
+{
+    if (any(greaterThanEqual(uvec2(tap), uvec2(frame.width, frame.height))))
+        return false;
+    float depth = texelFetch(previous_depth, tap, 0).x;
+    return depth > 0.0 && texelFetch(previous_albedo, tap, 0).a == s.identity &&
+           dot(octahedral_decode(texelFetch(previous_normals, tap, 0).xy), s.normal) >= 0.9 &&
+           abs(dot(s.normal, previous_position(tap, depth) - s.position)) <= s.tolerance;
+}
+
+// The nearest pixel around that showed the surface: what comes into sight at the rim of a surface has its history there
+// (Schied et al. 2017, section 4.1). False: there is none.
+bool reproject_nearest(vec2 place, reprojection_surface s, out reprojection r)
+{
+    vec2 size = vec2(frame.width, frame.height);
+    if (any(lessThan(place, vec2(-0.5))) || any(greaterThan(place, size - 0.5)))
+        return false; // came into the picture
+    float nearest = 1e30;
+    for (int i = 0; i < 9; i++) {
+        ivec2 tap = ivec2(round(place)) + ivec2(i % 3, i / 3) - 1;
+        float distance = dot(vec2(tap) - place, vec2(tap) - place);
+        if (distance < nearest && shows_surface(tap, s)) {
+            nearest = distance;
+            r = reprojection(tap, vec4(1.0, 0.0, 0.0, 0.0));
+        }
+    }
+    return nearest < 1e30;
+}
+
 // False where the last frame did not show the surface.
 bool reproject(uvec2 pixel, gbuffer_point point, out reprojection r)
 {
-    float identity = texelFetch(albedo_map, ivec2(pixel), 0).a;
     vec2 place = reprojection_place(pixel);
-    r.corner = ivec2(floor(place));
-    vec2 f = place - vec2(r.corner);
-    r.weights = vec4((1.0 - f.x) * (1.0 - f.y), f.x * (1.0 - f.y), (1.0 - f.x) * f.y, f.x * f.y);
     // An object that moved sideways by some pixels may have moved as far along its normal.
     float moved = object_motion(point.position, place);
     float tolerance = pixel_footprint(point.view_z) * (2.0 + (moved > 0.1 ? 2.0 * moved : 0.0));
-    for (int i = 0; i < 4; i++) {
-        ivec2 tap = reprojection_tap(r, i);
-        if (r.weights[i] == 0.0 || any(greaterThanEqual(uvec2(tap), uvec2(frame.width, frame.height)))) {
+    reprojection_surface s =
+        reprojection_surface(point.position, point.geometric, texelFetch(albedo_map, ivec2(pixel), 0).a, tolerance);
+    r.corner = ivec2(floor(place));
+    vec2 f = place - vec2(r.corner);
+    r.weights = vec4((1.0 - f.x) * (1.0 - f.y), f.x * (1.0 - f.y), (1.0 - f.x) * f.y, f.x * f.y);
+    for (int i = 0; i < 4; i++)
+        if (r.weights[i] > 0.0 && !shows_surface(reprojection_tap(r, i), s))
             r.weights[i] = 0.0;
-            continue;
-        }
-        float depth = texelFetch(previous_depth, tap, 0).x;
-        vec3 normal = octahedral_decode(texelFetch(previous_normals, tap, 0).xy);
-        if (depth <= 0.0 || texelFetch(previous_albedo, tap, 0).a != identity || dot(normal, point.geometric) < 0.9 ||
-            abs(dot(point.geometric, previous_position(tap, depth) - point.position)) > tolerance)
-            r.weights[i] = 0.0;
-    }
     float total = dot(r.weights, vec4(1.0));
     // Below a hundredth the history would be one badly placed texel.
     if (total < 0.01)
-        return false;
+        return reproject_nearest(place, s, r);
     r.weights /= total;
     return true;
 }

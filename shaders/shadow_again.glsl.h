@@ -19,6 +19,15 @@ struct shadow_record {
     uint visible;
 };
 
+// How far the filter's history of the ratio lags behind a stratum's samples, over the last few frames: what they add to
+// S beyond their U times the history's ratio. Without a lag these are innovations of a mean, which do not correlate.
+struct shadow_lag {
+    vec2 now;     // sums of U and S in this frame alone
+    float light;  // sum of U
+    float lag;    // sum of S - ratio * U
+    vec2 squares; // variance of `lag`: as found, and as the ratio lets expect, where few samples tell
+};
+
 uvec2 again_size() { return (uvec2(frame.width, frame.height) + AGAIN_SIDE - 1u) / AGAIN_SIDE; }
 uvec2 again_stratum(uvec2 pixel) { return pixel / AGAIN_SIDE; }
 uint again_index(uvec2 stratum) { return stratum.y * again_size().x + stratum.x; }

@@ -1,5 +1,5 @@
 // How many frames the history may count around each stratum of the last frame: from what the recorded samples on the same
-// surface around were and are now, their light and whether it arrives.
+// surface around were and are now, their light and whether it arrives, and from how far the history lags behind them.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "filter_geometry.glsl.h"
@@ -11,15 +11,22 @@ layout(set = 0, binding = 1, scalar) readonly buffer light_block { float light_n
 layout(set = 0, binding = 2, scalar) readonly buffer visible_block { uint visible_now[]; };
 layout(set = 0, binding = 3, rg32f) uniform writeonly image2D limit_map; // frames; the change, also that before
 layout(set = 0, binding = 4) uniform sampler2D previous_limit;
-layout(push_constant, scalar) uniform push_block { uint history_valid; } push; // 1: the last frame traced again too
+layout(set = 0, binding = 5, scalar) readonly buffer lags_block { shadow_lag lags[]; };
+layout(push_constant, scalar) uniform push_block {
+    uint history_valid; // 1: there was a limit in the last frame too
+    uint traced;        // 1: samples were traced again
+    uint has_lags;
+} push;
 
 const int RADIUS = 3; // strata
 const float UNLIMITED = 1e6;
-// Variance of the ratio that the filter leaves of one frame's samples, about.
+// Variance of the ratio that the filter leaves of one frame's samples, about; of a low ratio it is proportional to that.
 const float VARIANCE = 0.001;
 // How much the ratio changes where all the light comes from elsewhere, about, and the share of the light that may come
 // from elsewhere before it counts: what drifts so slowly the history follows.
 const float LIGHT_CHANGE = 1.0, LIGHT_TOLERANCE = 0.2;
+
+const shadow_lag NO_LAG = shadow_lag(vec2(0.0), 0.0, 0.0, vec2(0.0));
 
 struct sums {
     vec4 light;   // U before, S before, U now, S now
@@ -27,6 +34,7 @@ struct sums {
     float count;  // records
     float logarithms; // of now over before, of those that still have light
     float lit;        // how many these are
+    shadow_lag lag;
     vec3 same;        // of records of the instance whose VPL sends what it did: U, the change of S, and the squares of that
 };
 
@@ -35,11 +43,12 @@ struct neighbour {
     bool same;   // and on the same instance
     float before, now; // what the sample adds to U
     bool seen_before, seen_now;
+    shadow_lag lag;
 };
 
 neighbour neighbour_at(ivec2 stratum, shadow_record center, float footprint)
 {
-    neighbour n = neighbour(false, false, 0.0, 0.0, false, false);
+    neighbour n = neighbour(false, false, 0.0, 0.0, false, false, NO_LAG);
     ivec2 size = ivec2(again_size());
     if (any(lessThan(stratum, ivec2(0))) || any(greaterThanEqual(stratum, size)))
         return n;
@@ -53,9 +62,11 @@ neighbour neighbour_at(ivec2 stratum, shadow_record center, float footprint)
                abs(dot(normal, r.position - center.position)) < footprint;
     n.same = r.identity == center.identity;
     n.before = r.weight * r.light;
-    n.now = r.weight * abs(light_now[index]);
+    n.now = push.traced != 0u ? r.weight * abs(light_now[index]) : n.before;
     n.seen_before = r.visible != 0u;
-    n.seen_now = light_now[index] > 0.0 ? visible_now[index] != 0u : n.seen_before;
+    n.seen_now = push.traced != 0u && light_now[index] > 0.0 ? visible_now[index] != 0u : n.seen_before;
+    if (push.has_lags != 0u)
+        n.lag = lags[index];
     return n;
 }
 
@@ -65,6 +76,10 @@ void add(inout sums sum, neighbour n)
     sum.light += vec4(n.before, seen_before, n.now, seen_now);
     sum.squares += vec3(seen_before * seen_before, seen_before * seen_now, seen_now * seen_now);
     sum.count += 1.0;
+    sum.lag.now += n.lag.now;
+    sum.lag.light += n.lag.light;
+    sum.lag.lag += n.lag.lag;
+    sum.lag.squares += n.lag.squares;
     if (n.same && abs(n.now - n.before) < 0.01 * n.before) {
         float change = n.before * (float(n.seen_now) - float(n.seen_before));
         sum.same += vec3(n.before, change, change * change);
@@ -92,11 +107,25 @@ float occlusion_change(sums sum)
     return max(abs(sum.same.y) - sqrt(sum.same.z), 0.0) / max(sum.light.x, 1e-30);
 }
 
-// Of a ratio that drifts by d a frame, n frames are off by n d / 2 and leave the variance VARIANCE / n: the sum of the
-// squares is least at n^3 = 2 VARIANCE / d^2.
-float frames_of(float change)
+float variance_of(float ratio) { return VARIANCE * min(4.0 * ratio, 1.0); }
+
+// Of a ratio that drifts by d a frame, n frames are off by n d / 2 and leave the variance V / n: the sum of the squares is
+// least at n^3 = 2 V / d^2.
+float frames_of(float change, float variance)
 {
-    return change > 1e-4 ? pow(2.0 * VARIANCE / (change * change), 1.0 / 3.0) : UNLIMITED;
+    return change > 1e-4 ? pow(2.0 * variance / (change * change), 1.0 / 3.0) : UNLIMITED;
+}
+
+// A history of n frames that is off by b and one frame of the variance V: the squares' sum of their mean is least at
+// n = V / b^2.
+float lag_frames(shadow_lag lag)
+{
+    if (lag.now.x <= 0.0)
+        return UNLIMITED;
+    const float NOISE = 3.0; // standard deviations
+    float deviation = sqrt(max(lag.squares.x, lag.squares.y));
+    float off = max(abs(lag.lag) - NOISE * deviation, 0.0) / lag.light;
+    return off > 1e-4 ? variance_of(clamp(lag.now.y / lag.now.x, 0.0, 1.0)) / (off * off) : UNLIMITED;
 }
 
 // What changed around in the last frames, the oldest least.
@@ -110,12 +139,18 @@ float change_before(ivec2 stratum)
     return 0.9 * before;
 }
 
-// Of the light, and by what stands in its way.
-vec2 change_of(ivec2 stratum, shadow_record center)
+struct finding {
+    float light;     // change of the light
+    float occlusion; // change by what stands in its way
+    float ratio;     // now
+    float lag;       // frames, by the lag of the history
+};
+
+finding finding_of(ivec2 stratum, shadow_record center)
 {
     float view_z = dot(center.position - frame.previous_eye, frame.previous_forward);
     float footprint = 4.0 * float(AGAIN_SIDE) * pixel_footprint(view_z);
-    sums sum = sums(vec4(0.0), vec3(0.0), 0.0, 0.0, 0.0, vec3(0.0));
+    sums sum = sums(vec4(0.0), vec3(0.0), 0.0, 0.0, 0.0, NO_LAG, vec3(0.0));
     for (int i = 0; i < (2 * RADIUS + 1) * (2 * RADIUS + 1); i++) {
         neighbour n = neighbour_at(stratum + ivec2(i % (2 * RADIUS + 1), i / (2 * RADIUS + 1)) - RADIUS, center, footprint);
         if (n.counts)
@@ -131,7 +166,8 @@ vec2 change_of(ivec2 stratum, shadow_record center)
     // Of few records each may change by chance.
     float tolerance = LIGHT_TOLERANCE + 0.5 * inversesqrt(max(sum.count, 1.0));
     elsewhere = max(elsewhere / max(sum.count, 1.0) - tolerance, 0.0);
-    return vec2(max(ratio_change(sum), LIGHT_CHANGE * elsewhere), occlusion_change(sum));
+    return finding(max(ratio_change(sum), LIGHT_CHANGE * elsewhere), occlusion_change(sum),
+                   clamp(sum.light.w / max(sum.light.z, 1e-30), 0.0, 1.0), lag_frames(sum.lag));
 }
 
 void main()
@@ -145,8 +181,11 @@ void main()
         ivec2 next = clamp(stratum + ivec2(i % 3, i / 3) - 1, ivec2(0), ivec2(again_size()) - 1);
         center = records[again_index(uvec2(next))];
     }
-    vec2 change = center.light > 0.0 ? change_of(stratum, center) : vec2(0.0);
+    finding found = finding(0.0, 0.0, 1.0, UNLIMITED);
+    if (center.light > 0.0)
+        found = finding_of(stratum, center);
     // Light that changes as much in frame after frame drifts, and the history follows; what is new counts.
-    float before = change_before(stratum), sudden = max(change.x - 1.5 * before, 0.0);
-    imageStore(limit_map, stratum, vec4(frames_of(max(sudden, change.y)), max(change.x, before), 0.0, 0.0));
+    float before = change_before(stratum), sudden = max(found.light - 1.5 * before, 0.0);
+    float frames = min(frames_of(max(sudden, found.occlusion), variance_of(found.ratio)), found.lag);
+    imageStore(limit_map, stratum, vec4(frames, max(found.light, before), 0.0, 0.0));
 }

@@ -150,9 +150,9 @@ accumulated accumulate(ivec2 pixel, gbuffer_point point, surroundings around)
 vec2 variance_of(accumulated sum, surroundings around)
 {
     float u = luminance(sum.unshadowed), s = luminance(sum.shadowed);
-    vec2 variance = sum.moments.w < SVGF_TEMPORAL_FRAMES
-                        ? svgf_variance(around.means.x, around.means.y, around.moments)
-                        : svgf_variance(u, s, sum.moments.xyz);
+    vec2 variance = svgf_variance(u, s, sum.moments.xyz);
+    if (sum.moments.w < SVGF_TEMPORAL_FRAMES)
+        variance = max(variance, svgf_variance(around.means.x, around.means.y, around.moments));
     return svgf_mean_variance(variance, u, sum.moments.w);
 }
 

@@ -62,15 +62,27 @@ light_ray spot_ray(punctual_light light, vec2 u)
     return light_ray(light.position, direction, light.color * (falloff * falloff * 2.0 * PI * (1.0 - cos_outer)));
 }
 
-// From the rectangle that the scene's bounds cover, seen along the light.
+// Through points that stay where they are while the light turns, so that VPLs stay too: on the side of the scene's bounds
+// that the light ends on, of the axis that it is closest to. They repeat with a period that holds the bounds' shadow
+// there, and changes in steps.
 light_ray directional_ray(punctual_light light, vec2 u)
 {
-    mat3 basis = basis_of(light.direction);
-    vec3 centre = 0.5 * (frame.scene_min + frame.scene_max);
-    vec3 half_size = 0.5 * (frame.scene_max - frame.scene_min);
-    vec3 extent = vec3(dot(abs(basis[0]), half_size), dot(abs(basis[1]), half_size), dot(abs(basis[2]), half_size));
-    vec3 local = vec3((2.0 * u - 1.0) * extent.xy, -1.01 * extent.z - 1e-3 * frame.scene_radius);
-    return light_ray(centre + basis * local, light.direction, light.color * (4.0 * extent.x * extent.y));
+    vec3 d = light.direction, size = max(frame.scene_max - frame.scene_min, vec3(1e-4 * frame.scene_radius));
+    int k = abs(d.y) >= max(abs(d.x), abs(d.z)) ? 1 : abs(d.x) >= abs(d.z) ? 0 : 2;
+    vec3 side = d / abs(d[k]) * size[k]; // across the bounds
+    vec3 end = vec3(0.0);
+    end[k] = d[k] < 0.0 ? frame.scene_min[k] : frame.scene_max[k];
+    float area = 1.0;
+    for (int n = 1; n < 3; n++) {
+        int i = (k + n) % 3;
+        float width = size[i] + abs(side[i]), low = frame.scene_min[i] + min(side[i], 0.0);
+        float period = size[i] * exp2(ceil(8.0 * log2(width / size[i])) / 8.0);
+        float anchor = frame.scene_min[i] + u[n - 1] * period;
+        end[i] = anchor - period * floor((anchor - low) / period); // in [low, low + period)
+        area *= period;
+    }
+    vec3 start = end - side - (0.01 * length(side) + 1e-3 * frame.scene_radius) * d;
+    return light_ray(start, d, light.color * (area * abs(d[k])));
 }
 
 light_ray emitter_ray(emissive_triangle emitter, vec2 u, vec2 v)

@@ -1,5 +1,5 @@
-// The picture over time: it comes to rest when nothing changes, follows a switched light, and keeps no ghost where
-// something was uncovered. Figures are printed; see modules/sequence_measure.h.
+// The picture over time: it comes to rest when nothing changes, follows a switched light and a swinging door, and keeps
+// no ghost where something was uncovered. Figures are printed; see modules/sequence_measure.h.
 #include "modules/renderer.h"
 #include "modules/sequence_measure.h"
 #include "modules/world.h"
@@ -7,8 +7,6 @@
 #include "test.h"
 
 #include <stdlib.h>
-
-#define SCENE BUILD_DIR "/scenes/two_rooms.glb"
 
 static gpu *device;
 
@@ -40,12 +38,17 @@ static void *fixture_check(const void *made)
     return (void *)made;
 }
 
+static fixture scene_create(const char *path, const char *camera, const render_settings *settings)
+{
+    fixture f = {.scene = fixture_check(scene_load(path))};
+    f.r = fixture_check(renderer_create(device, f.scene, settings));
+    f.r->camera = renderer_camera_of_scene(f.r, scene_camera_find(f.scene, camera));
+    return f;
+}
+
 static fixture rooms_create(const render_settings *settings)
 {
-    fixture f = {.scene = fixture_check(scene_load(SCENE))};
-    f.r = fixture_check(renderer_create(device, f.scene, settings));
-    f.r->camera = renderer_camera_of_scene(f.r, scene_camera_find(f.scene, "lit"));
-    return f;
+    return scene_create(BUILD_DIR "/scenes/two_rooms.glb", "lit", settings);
 }
 
 static void fixture_destroy(fixture *f)
@@ -217,6 +220,75 @@ TEST(a_switched_light_settles_within_eight_frames)
     switch_check("off", 100, 0);
 }
 
+// ---- A door that opens into a dark room, and closes
+
+static node_component *door_find(renderer *r)
+{
+    for (ecs_iterator it = ecs_iterate(r->world, r->gpu_world->mesh); ecs_next(&it);)
+        if (strcmp(r->scene->meshes[((mesh_component *)it.component)->mesh].name, "door") == 0) {
+            const entity e = it.entity;
+            ecs_iterate_end(&it);
+            return ecs_get(r->world, e, r->gpu_world->node);
+        }
+    return NULL;
+}
+
+// `open` in [0,1], of a quarter turn.
+static void door_turn(renderer *r, float open)
+{
+    node_component *door = fixture_check(door_find(r));
+    const float angle = 1.5707963f * open;
+    door->matrix[0] = door->matrix[10] = cosf(angle);
+    door->matrix[8] = sinf(angle);
+    door->matrix[2] = -door->matrix[8];
+}
+
+static double room_light(renderer *r)
+{
+    float *frame = frame_make(r);
+    double sum = 0;
+    for (uint32_t i = 0; i < 3 * PIXELS; i++)
+        sum += (double)frame[i];
+    free(frame);
+    return sum / (3 * PIXELS);
+}
+
+enum { SWING = 6, AFTER = 9 };
+
+// Turns it within SWING frames; light[i]: i frames after the last of them.
+static void door_swing(renderer *r, bool opens, double light[AFTER])
+{
+    for (int i = 1; i < SWING; i++) {
+        door_turn(r, (float)(opens ? i : SWING - i) / SWING);
+        frames_skip(r, 1);
+    }
+    door_turn(r, opens ? 1 : 0);
+    for (int i = 0; i < AFTER; i++)
+        light[i] = room_light(r);
+}
+
+TEST(a_room_is_as_bright_as_the_door_lets_it_be)
+{
+    const render_settings s = settings_small();
+    double opened[AFTER], closed[AFTER];
+    fixture f = scene_create(BUILD_DIR "/scenes/door.glb", "unlit", &s);
+    frames_skip(f.r, 12);
+    const double before = room_light(f.r);
+    door_swing(f.r, true, opened);
+    frames_skip(f.r, 2 * STILL_SAMPLES);
+    const double lit = room_light(f.r);
+    door_swing(f.r, false, closed);
+    printf("  of the open room's light: %.1e before; %.3f, %.3f and %.3f when open and 4 and 8 frames after; %.4f, "
+           "%.4f and "
+           "%.4f when closed and 1 and 8 frames after\n",
+           before / lit, opened[0] / lit, opened[4] / lit, opened[8] / lit, closed[0] / lit, closed[1] / lit,
+           closed[8] / lit);
+    CHECK(lit > 0 && before < 1e-3 * lit);
+    CHECK(fabs(opened[4] - lit) < 0.1 * lit && fabs(opened[8] - lit) < 0.06 * lit);
+    CHECK(closed[0] < 0.1 * lit && closed[1] < 0.02 * lit && closed[8] < 0.002 * lit);
+    fixture_destroy(&f);
+}
+
 // ---- What was uncovered
 
 static void history_read(renderer *r, float (*moments)[4], float *depth)
@@ -371,6 +443,7 @@ int main(void)
     RUN(a_still_picture_comes_to_rest);
     RUN(a_picture_at_rest_follows_what_moves);
     RUN(a_switched_light_settles_within_eight_frames);
+    RUN(a_room_is_as_bright_as_the_door_lets_it_be);
     RUN(a_moving_instance_leaves_no_history_behind);
     RUN(a_pan_starts_anew_where_it_uncovers);
     RUN(the_validation_layer_has_nothing_to_say);

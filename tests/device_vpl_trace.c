@@ -350,6 +350,59 @@ TEST(a_light_that_moves_takes_its_own_paths_only)
     pair_destroy(&p);
 }
 
+static node_component *sun_find(renderer *r)
+{
+    for (ecs_iterator it = ecs_iterate(r->world, r->gpu_world->light); ecs_next(&it);)
+        if (((light_component *)it.component)->type == LIGHT_DIRECTIONAL) {
+            const entity e = it.entity;
+            ecs_iterate_end(&it);
+            return ecs_get(r->world, e, r->gpu_world->node);
+        }
+    return NULL;
+}
+
+static void turn_about_x(float m[16], float angle)
+{
+    for (int column = 0; column < 3; column++) {
+        const float y = m[4 * column + 1], z = m[4 * column + 2];
+        m[4 * column + 1] = cosf(angle) * y - sinf(angle) * z;
+        m[4 * column + 2] = sinf(angle) * y + cosf(angle) * z;
+    }
+}
+
+// Light paths that reach the ground reach it where they did: all moving alike would flicker.
+TEST(a_sun_that_turns_leaves_the_lights_on_the_ground_where_they_are)
+{
+    const uint32_t count = 9000;
+    pair p = pair_create(SCENES "atrium.glb", RAYS_AUTO, count);
+    tally t = {0};
+    frame_check(&p, &t);
+    vpl *before = vpls_read(p.kept);
+    BOTH(&p, r)
+    {
+        node_component *sun = sun_find(r);
+        CHECK(sun != NULL);
+        turn_about_x(sun->matrix, 0.007f);
+    }
+    frame_check(&p, &t);
+    vpl *after = vpls_read(p.kept);
+    uint32_t on_ground = 0, stayed = 0;
+    const float ground = p.kept->constants.scene_min[1] + 0.5f;
+    for (uint32_t i = 0; i < count; i++) {
+        const vpl *a = &before[i], *b = &after[i];
+        if (a->bounce != 0 || b->bounce != 0 || a->intensity <= 0 || b->intensity <= 0 || a->normal[1] < 0.9f ||
+            a->position[1] > ground || b->position[1] > ground)
+            continue;
+        on_ground++;
+        stayed += hypotf(a->position[0] - b->position[0], a->position[2] - b->position[2]) < 0.01f;
+    }
+    printf("  %u of %u lights on the ground stay within a centimetre\n", stayed, on_ground);
+    CHECK(on_ground > 50 && stayed > 0.9 * on_ground);
+    free(before);
+    free(after);
+    pair_destroy(&p);
+}
+
 TEST(the_validation_layer_has_nothing_to_say)
 {
     CHECK(gpu_validation_messages(devices[0]) == 0 && gpu_validation_messages(devices[1]) == 0);
@@ -368,6 +421,7 @@ int main(void)
     RUN(colors_and_emission_that_change_make_what_tracing_everything_makes);
     RUN(settings_trace_everything_anew);
     RUN(a_light_that_moves_takes_its_own_paths_only);
+    RUN(a_sun_that_turns_leaves_the_lights_on_the_ground_where_they_are);
     RUN(the_validation_layer_has_nothing_to_say);
     for (size_t i = 0; i < countof(devices); i++)
         gpu_destroy(devices[i]);
