@@ -132,13 +132,19 @@ static void previous_constants(frame_constants *c, const frame_constants *last)
 
 // ---- What stays as it is
 
+// Whether light and surfaces are those of the last frame.
+static bool frame_is_steady(const renderer *r)
+{
+    const world_changes *changes = &r->gpu_world->changes;
+    return !changes->bounds && !changes->sources && changes->box_count == 0;
+}
+
 // Whether nothing differs from the last frame but the random numbers.
 static bool frame_is_still(const renderer *r)
 {
     const frame_constants *c = &r->constants;
-    const world_changes *changes = &r->gpu_world->changes;
-    return r->frame > 0 && frame_graph_has_history(r->graph, "depth") && !changes->bounds && !changes->sources &&
-           changes->box_count == 0 && memcmp(c->view_projection, c->previous_view_projection, 64) == 0 &&
+    return r->frame > 0 && frame_graph_has_history(r->graph, "depth") && frame_is_steady(r) &&
+           memcmp(c->view_projection, c->previous_view_projection, 64) == 0 &&
            memcmp(c->eye, c->previous_eye, sizeof c->eye) == 0 &&
            memcmp(&r->settings, &r->last_settings, sizeof r->settings) == 0;
 }
@@ -168,6 +174,7 @@ static void constants_extract(ecs_world *world, void *user)
     c->auto_exposure = r->settings.auto_exposure;
     c->exposure_ev = r->settings.exposure;
     r->still_frames = frame_is_still(r) ? r->still_frames + 1 : 0;
+    r->steady_frames = r->frame == 0 ? STILL_SAMPLES : frame_is_steady(r) ? r->steady_frames + 1 : 0;
     r->last_settings = r->settings;
     memcpy(gpu_buffer_map(r->gpu, r->gpu_world->frame), c, sizeof *c);
 }

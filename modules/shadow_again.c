@@ -140,18 +140,23 @@ static void lag_declare(renderer *r, const shadow_again *state)
 // Whether samples are traced again in this frame.
 static bool is_traced(const renderer *r)
 {
-    const world_changes *changes = &r->gpu_world->changes;
-    return changes->sources || changes->bounds || changes->box_count > 0;
+    return r->frame > 0 && r->steady_frames == 0;
+}
+
+// Whether the history may hold frames of another light.
+static bool may_lag(const renderer *r)
+{
+    return r->settings.filter && r->steady_frames < STILL_SAMPLES && !renderer_is_settled(r);
 }
 
 static bool has_lags(const renderer *r)
 {
-    return frame_graph_has_history(r->graph, "shadow_lag") && !renderer_is_settled(r);
+    return may_lag(r) && frame_graph_has_history(r->graph, "shadow_lag");
 }
 
 const char *shadow_again_limit(const renderer *r)
 {
-    return renderer_has_shadows(r) && r->frame > 0 && (is_traced(r) || has_lags(r)) &&
+    return renderer_has_shadows(r) && (is_traced(r) || has_lags(r)) &&
                    frame_graph_has_history(r->graph, "shadow_records")
                ? "shadow_limit"
                : NULL;
@@ -219,7 +224,7 @@ static void shadow_again_setup(renderer *r, void *user)
         hold_declare(r, state);
     else
         record_declare(r, state);
-    if (r->settings.filter && !renderer_is_settled(r))
+    if (may_lag(r))
         lag_declare(r, state);
     if (!shadow_again_limit(r))
         return;

@@ -4,7 +4,7 @@
 //
 // What they do not tell, changes that go on for frames, shows as a lag: over the pixels of a surface around, a frame's
 // samples give another ratio than the history does. The history is cut where the lag of the last frames is beyond
-// chance, also when nothing changes any more.
+// chance, also for STILL_SAMPLES frames in which nothing changes any more.
 //
 //   shadow_records     one a stratum of 4 x 4 pixels: see shaders/shadow_again.glsl.h
 //   shadow_lag         the same of the lag

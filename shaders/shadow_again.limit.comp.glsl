@@ -33,7 +33,7 @@ struct sums {
     vec3 squares; // of S: before, before times now, now
     float count;  // records
     float logarithms; // of now over before, of those that still have light
-    float lit;        // how many these are
+    float lit;        // how many these are; both where samples were traced again
     shadow_lag lag;
     vec3 same;        // of records of the instance whose VPL sends what it did: U, the change of S, and the squares of that
 };
@@ -84,7 +84,7 @@ void add(inout sums sum, neighbour n)
         float change = n.before * (float(n.seen_now) - float(n.seen_before));
         sum.same += vec3(n.before, change, change * change);
     }
-    if (n.now > 0.0) {
+    if (push.traced != 0u && n.now > 0.0) {
         sum.logarithms += clamp(log(n.now / n.before), -4.0, 4.0);
         sum.lit += 1.0;
     }
@@ -146,6 +146,20 @@ struct finding {
     float lag;       // frames, by the lag of the history
 };
 
+// What share of the light comes from elsewhere, beyond chance. All of it brighter or dimmer alike does not change the ratio.
+float light_elsewhere(sums sum, ivec2 stratum, shadow_record center, float footprint)
+{
+    float mean = exp(sum.logarithms / max(sum.lit, 1.0)), elsewhere = 0.0;
+    for (int i = 0; i < (2 * RADIUS + 1) * (2 * RADIUS + 1); i++) {
+        neighbour n = neighbour_at(stratum + ivec2(i % (2 * RADIUS + 1), i / (2 * RADIUS + 1)) - RADIUS, center, footprint);
+        if (n.counts)
+            elsewhere += abs(n.now - mean * n.before) / (n.now + mean * n.before);
+    }
+    // Of few records each may change by chance.
+    float tolerance = LIGHT_TOLERANCE + 0.5 * inversesqrt(max(sum.count, 1.0));
+    return max(elsewhere / max(sum.count, 1.0) - tolerance, 0.0);
+}
+
 finding finding_of(ivec2 stratum, shadow_record center)
 {
     float view_z = dot(center.position - frame.previous_eye, frame.previous_forward);
@@ -156,16 +170,7 @@ finding finding_of(ivec2 stratum, shadow_record center)
         if (n.counts)
             add(sum, n);
     }
-    // What share of the light comes from elsewhere. All of it brighter or dimmer alike does not change the ratio.
-    float mean = exp(sum.logarithms / max(sum.lit, 1.0)), elsewhere = 0.0;
-    for (int i = 0; i < (2 * RADIUS + 1) * (2 * RADIUS + 1); i++) {
-        neighbour n = neighbour_at(stratum + ivec2(i % (2 * RADIUS + 1), i / (2 * RADIUS + 1)) - RADIUS, center, footprint);
-        if (n.counts)
-            elsewhere += abs(n.now - mean * n.before) / (n.now + mean * n.before);
-    }
-    // Of few records each may change by chance.
-    float tolerance = LIGHT_TOLERANCE + 0.5 * inversesqrt(max(sum.count, 1.0));
-    elsewhere = max(elsewhere / max(sum.count, 1.0) - tolerance, 0.0);
+    float elsewhere = push.traced != 0u ? light_elsewhere(sum, stratum, center, footprint) : 0.0;
     return finding(max(ratio_change(sum), LIGHT_CHANGE * elsewhere), occlusion_change(sum),
                    clamp(sum.light.w / max(sum.light.z, 1e-30), 0.0, 1.0), lag_frames(sum.lag));
 }
