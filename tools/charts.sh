@@ -20,14 +20,14 @@ suites=("$@")
 
 # Scripts, the frames that are measured, and what their references are.
 motion_scripts='
+slow_pan 16:34 --reference-spp 256
+moving_sun 16:30 --reference-spp 48
+swinging_door 28:76 --reference-spp 64
 still 88:120 --reference-spp 64
-slow_pan 16:46 --reference-spp 256
-fast_pan 0:30 --reference-spp 64
-moving_sun 16:46 --reference-spp 64
-light_switch 24:90 --reference-spp 64
-swinging_door 24:90 --reference-spp 64
-dancers 100:130 --reference-spp 64
-lanterns 16:46 --reference-spp 64
+light_switch 28:60 --reference-spp 32
+fast_pan 0:16 --reference-spp 64
+lanterns 16:24 --reference-spp 32
+dancers 30:40 --reference-spp 32
 '
 
 # One page for all scripts: tables, and the flicker over the frames.
