@@ -22,6 +22,9 @@ layout(push_constant, scalar) uniform push_block {
     uint ray_count; // paths, and one without a ray where there are slots that no path fills
 } push;
 
+const uint DIRECTIONAL_TRIES = 32u; // a quarter or more of the points lie in the shadow
+const uint SOBOL_DIRECTIONAL = 16u; // groups of dimensions behind those of the bounces
+
 struct light_ray {
     vec3 origin, direction;
     vec3 flux; // of the whole source, as if it had launched this path alone
@@ -62,27 +65,35 @@ light_ray spot_ray(punctual_light light, vec2 u)
     return light_ray(light.position, direction, light.color * (falloff * falloff * 2.0 * PI * (1.0 - cos_outer)));
 }
 
-// Through points that stay where they are while the light turns, so that VPLs stay too: on the side of the scene's bounds
-// that the light ends on, of the axis that it is closest to. They repeat with a period that holds the bounds' shadow
-// there, and changes in steps.
-light_ray directional_ray(punctual_light light, vec2 u)
+// Through points that stay where they are while the light turns, so that VPLs stay too: on the side of the scene's
+// bounds that the light ends on, of the axis that it is closest to. Each path has a row of such points, in a room that
+// repeats on that side and is larger than the bounds' shadow there, and takes the first that lies in the shadow. A room
+// grows in steps of two, at which its points move; `phase` has few do so at a time.
+light_ray directional_ray(punctual_light light, vec2 u, uint index, uint seed)
 {
     vec3 d = light.direction, size = max(frame.scene_max - frame.scene_min, vec3(1e-4 * frame.scene_radius));
     int k = abs(d.y) >= max(abs(d.x), abs(d.z)) ? 1 : abs(d.x) >= abs(d.z) ? 0 : 2;
+    ivec2 across = ivec2((k + 1) % 3, (k + 2) % 3);
     vec3 side = d / abs(d[k]) * size[k]; // across the bounds
+    vec2 lean = vec2(side[across.x], side[across.y]), bounds = vec2(size[across.x], size[across.y]);
+    vec2 low = min(lean, 0.0), shadow = bounds + abs(lean); // where it begins, from scene_min, and its size
+    float phase = float((index >> 6) & 15u) / 16.0; // blocks of 64 points are well spread in themselves
+    vec2 room = bounds * exp2(ceil(log2(shadow / bounds) - phase) + phase);
+    vec2 point = low + u * shadow; // when none of the row does
+    for (uint n = 0u; n < DIRECTIONAL_TRIES; n++) {
+        vec2 next = (n == 0u ? u : sobol(index, SOBOL_DIRECTIONAL + n, seed).xy) * room;
+        next -= room * floor((next - low) / room); // in [low, low + room)
+        if (all(lessThan(next, low + shadow))) {
+            point = next;
+            break;
+        }
+    }
     vec3 end = vec3(0.0);
     end[k] = d[k] < 0.0 ? frame.scene_min[k] : frame.scene_max[k];
-    float area = 1.0;
-    for (int n = 1; n < 3; n++) {
-        int i = (k + n) % 3;
-        float width = size[i] + abs(side[i]), low = frame.scene_min[i] + min(side[i], 0.0);
-        float period = size[i] * exp2(ceil(8.0 * log2(width / size[i])) / 8.0);
-        float anchor = frame.scene_min[i] + u[n - 1] * period;
-        end[i] = anchor - period * floor((anchor - low) / period); // in [low, low + period)
-        area *= period;
-    }
+    end[across.x] = frame.scene_min[across.x] + point.x;
+    end[across.y] = frame.scene_min[across.y] + point.y;
     vec3 start = end - side - (0.01 * length(side) + 1e-3 * frame.scene_radius) * d;
-    return light_ray(start, d, light.color * (area * abs(d[k])));
+    return light_ray(start, d, light.color * (shadow.x * shadow.y * abs(d[k])));
 }
 
 light_ray emitter_ray(emissive_triangle emitter, vec2 u, vec2 v)
@@ -126,7 +137,7 @@ light_ray emit(vpl_source source, uint index)
     if (light >= frame.light_count)
         ray = emitter_ray(emitters[light - frame.light_count], u, v);
     else if (lights[light].type == LIGHT_DIRECTIONAL)
-        ray = directional_ray(lights[light], u);
+        ray = directional_ray(lights[light], u, index, seed);
     else if (lights[light].type == LIGHT_SPOT)
         ray = spot_ray(lights[light], u);
     else
