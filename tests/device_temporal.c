@@ -189,11 +189,11 @@ static void switch_check(const char *what, float before, float after)
     lamp_add(f.r, -3.2f, 0.35f, -1.5f, 40); // low, so that the furniture shades otherwise
     const entity lamp = lamp_of_scene(f.r);
     lamp_switch(f.r, lamp, before);
-    frames_skip(f.r, 40);
+    frames_skip(f.r, 32);
     lamp_switch(f.r, lamp, after);
     for (uint32_t i = 0; i < SETTLING; i++)
         frames[i] = frame_make(f.r);
-    frames_skip(f.r, 2 * STILL_SAMPLES);
+    frames_skip(f.r, STILL_SAMPLES);
     float *steady = frame_make(f.r);
     for (uint32_t i = 0; i < SETTLING; i++) {
         const sequence_distance d = sequence_distance_to(frames[i], steady, s.width, s.height);

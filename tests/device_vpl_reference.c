@@ -283,7 +283,7 @@ TEST(no_shadow_samples_means_no_shadows)
 // Not square, so that no pixel's centre lies on an edge of the box, where it depends on rounding what is visible.
 static void check_one_shader(uint32_t rays)
 {
-    render_settings s = settings_of(METHOD_VPL, 40, 700);
+    render_settings s = settings_of(METHOD_VPL, 40, 300);
     s.height = 37;
     s.rays = rays;
     fixture f = fixture_create(SCENES "cornell.glb", NULL, &s);

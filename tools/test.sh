@@ -6,4 +6,4 @@ cd "$(dirname "$0")/.."
 tools/setup.sh
 cmake --preset release >/dev/null
 cmake --build --preset release -- --quiet
-exec ctest --test-dir build --output-on-failure
+exec ctest --test-dir build --output-on-failure -j "$(nproc)"
