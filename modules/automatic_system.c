@@ -3,8 +3,6 @@
 #include "modules.h"
 #include "probe.h"
 
-#include <string.h>
-
 typedef struct automatic_state {
     automatic controller;
     bool running;
@@ -37,30 +35,16 @@ static automatic_frame frame_measure(renderer *r)
     return frame;
 }
 
-// The settings are not those that the last frame was to be rendered with: someone else changed them.
-static bool is_stale(const automatic_state *state, const render_settings *settings)
-{
-    uint32_t count;
-    const setting_info *table = settings_table(&count);
-    bool same = true;
-    for (uint32_t i = 0; i < count; i++) {
-        char expected[32], actual[32];
-        settings_get(&state->controller.current, &table[i], expected);
-        settings_get(settings, &table[i], actual);
-        same = same && strcmp(expected, actual) == 0;
-    }
-    return !same;
-}
-
 static void automatic_run(ecs_world *world, void *user)
 {
     (void)world;
     renderer *r = user;
     automatic_state *state = state_of(r);
     const bool wanted = (r->settings.target_ms > 0 || r->settings.target_error > 0) && !automatic_refusal(&r->settings);
-    if (wanted && (!state->running || is_stale(state, &r->settings))) {
-        automatic_start(&state->controller, &r->settings);
-    } else if (wanted) {
+    if (wanted && (!state->running || !settings_equal(&state->controller.current, &r->settings))) {
+        automatic_start(&state->controller, &r->settings); // or someone else changed them
+    } else if (wanted &&
+               !renderer_is_settled(r)) { // a settled picture leaves passes out, which says nothing of the next
         const automatic_frame frame = frame_measure(r);
         if (automatic_step(&state->controller, &frame, &r->settings))
             log_info("%s", state->controller.reason);

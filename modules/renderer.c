@@ -132,11 +132,10 @@ static void previous_constants(frame_constants *c, const frame_constants *last)
 
 // ---- What stays as it is
 
-// Whether light and surfaces are those of the last frame.
+// Whether light and surfaces are those of the last frame, and are to be rendered as they were.
 static bool frame_is_steady(const renderer *r)
 {
-    const world_changes *changes = &r->gpu_world->changes;
-    return !changes->bounds && !changes->sources && changes->box_count == 0;
+    return !world_has_changed(r->gpu_world) && settings_equal(&r->settings, &r->last_settings);
 }
 
 // Whether nothing differs from the last frame but the random numbers.
@@ -145,8 +144,7 @@ static bool frame_is_still(const renderer *r)
     const frame_constants *c = &r->constants;
     return r->frame > 0 && frame_graph_has_history(r->graph, "depth") && frame_is_steady(r) &&
            memcmp(c->view_projection, c->previous_view_projection, 64) == 0 &&
-           memcmp(c->eye, c->previous_eye, sizeof c->eye) == 0 &&
-           memcmp(&r->settings, &r->last_settings, sizeof r->settings) == 0;
+           memcmp(c->eye, c->previous_eye, sizeof c->eye) == 0;
 }
 
 bool renderer_is_settled(const renderer *r)

@@ -98,7 +98,7 @@ typedef struct renderer {
     double time; // seconds, of the next frame, by the clock of its animations; may be changed between frames
     uint32_t frame; // number of frames rendered so far
     uint32_t still_frames; // how many frames in a row, up to this one, show what the frame before showed
-    uint32_t steady_frames; // how many have the light and surfaces of the one before; the first: STILL_SAMPLES
+    uint32_t steady_frames; // how many have light, surfaces and settings of the one before; the first: STILL_SAMPLES
     render_settings last_settings; // the last frame's
     double milliseconds; // that the last frame took, by the clock
     bool failed; // in the current frame; systems set it after logging why

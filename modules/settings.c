@@ -611,3 +611,18 @@ void settings_get(const render_settings *settings, const setting_info *info, cha
         break;
     }
 }
+
+bool settings_equal(const render_settings *a, const render_settings *b)
+{
+    uint32_t count;
+    const setting_info *const table = settings_table(&count);
+    for (uint32_t i = 0; i < count; i++) {
+        char texts[2][32];
+        settings_get(a, &table[i], texts[0]);
+        settings_get(b, &table[i], texts[1]);
+        if (strcmp(texts[0], texts[1]) != 0) {
+            return false;
+        }
+    }
+    return true;
+}

@@ -96,3 +96,5 @@ const setting_info *settings_find(const char *name); // NULL when unknown
 bool settings_set(render_settings *settings, const setting_info *info, const char *text, setting_error *error);
 // The value as text that settings_set reads back to the same value.
 void settings_get(const render_settings *settings, const setting_info *info, char text[32]);
+// Whether all settings have the same values; padding does not count.
+bool settings_equal(const render_settings *a, const render_settings *b);

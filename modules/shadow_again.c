@@ -23,7 +23,8 @@ typedef struct again_pass {
     struct {
         uint32_t slot_count;
         float singularity;
-    } push;
+        uint32_t records_valid;
+    } push; // rays
 } again_pass;
 
 static again_pass pass_of(const renderer *r, gpu_pipeline pipeline)
@@ -33,7 +34,7 @@ static again_pass pass_of(const renderer *r, gpu_pipeline pipeline)
         .pipeline = pipeline,
         .columns = div_up_u32(s->width, SIDE),
         .rows = div_up_u32(s->height, SIDE),
-        .push = {s->vpls, renderer_singularity(r)},
+        .push = {renderer_slots(r), renderer_singularity(r)},
     };
 }
 
@@ -46,7 +47,8 @@ static void strata_execute(const frame_graph_context *context, void *user)
 
 static void rays_execute(const frame_graph_context *context, void *user)
 {
-    const again_pass *args = user;
+    again_pass *args = user;
+    args->push.records_valid = frame_graph_history_valid(context, "shadow_records");
     frame_graph_bind(context, args->pipeline);
     gpu_push(context->commands, &args->push, sizeof args->push);
     gpu_dispatch(context->commands, div_up_u32(args->columns * args->rows, 64), 1, 1);
@@ -55,7 +57,8 @@ static void rays_execute(const frame_graph_context *context, void *user)
 static void limit_execute(const frame_graph_context *context, void *user)
 {
     const again_pass *args = user;
-    const uint32_t push[] = {frame_graph_history_valid(context, "shadow_limit"), args->traced, args->has_lags};
+    const uint32_t push[] = {frame_graph_history_valid(context, "shadow_limit"),
+                             frame_graph_history_valid(context, "shadow_records"), args->traced, args->has_lags};
     frame_graph_bind(context, args->pipeline);
     gpu_push(context->commands, push, sizeof push);
     gpu_dispatch(context->commands, div_up_u32(args->columns, PIXEL_GROUP_WIDTH), args->rows, 1);
@@ -140,7 +143,7 @@ static void lag_declare(renderer *r, const shadow_again *state)
 // Whether samples are traced again in this frame.
 static bool is_traced(const renderer *r)
 {
-    return r->frame > 0 && r->steady_frames == 0;
+    return r->frame > 0 && world_has_changed(r->gpu_world);
 }
 
 // Whether the history may hold frames of another light.

@@ -368,6 +368,11 @@ static void tlas_instances_write(renderer *r, VkAccelerationStructureInstanceKHR
     }
 }
 
+bool world_has_changed(const world_gpu *w)
+{
+    return w->changes.bounds || w->changes.sources || w->changes.box_count > 0;
+}
+
 bool world_instance_moved(const mesh_instance_gpu *instance)
 {
     return memcmp(instance->world, instance->previous_world, sizeof instance->world) != 0 ||

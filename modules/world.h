@@ -150,6 +150,8 @@ void world_mesh_triangles(const renderer *r, uint32_t mesh, VkDeviceAddress posi
 
 // Moved or deformed since the last frame.
 bool world_instance_moved(const mesh_instance_gpu *instance);
+// Light or surfaces are not those of the last frame.
+bool world_has_changed(const world_gpu *w);
 
 // ---- Between the world's files.
 bool world_upload(renderer *r); // world_upload.c: what never changes, and materials at first

@@ -14,6 +14,7 @@ layout(set = 0, binding = 4) uniform sampler2D previous_limit;
 layout(set = 0, binding = 5, scalar) readonly buffer lags_block { shadow_lag lags[]; };
 layout(push_constant, scalar) uniform push_block {
     uint history_valid; // 1: there was a limit in the last frame too
+    uint records_valid;
     uint traced;        // 1: samples were traced again
     uint has_lags;
 } push;
@@ -27,6 +28,14 @@ const float VARIANCE = 0.001;
 const float LIGHT_CHANGE = 1.0, LIGHT_TOLERANCE = 0.2;
 
 const shadow_lag NO_LAG = shadow_lag(vec2(0.0), 0.0, 0.0, vec2(0.0));
+
+shadow_record record_at(uint index)
+{
+    shadow_record r = records[index];
+    if (push.records_valid == 0u)
+        r.light = 0.0;
+    return r;
+}
 
 struct sums {
     vec4 light;   // U before, S before, U now, S now
@@ -53,7 +62,7 @@ neighbour neighbour_at(ivec2 stratum, shadow_record center, float footprint)
     if (any(lessThan(stratum, ivec2(0))) || any(greaterThanEqual(stratum, size)))
         return n;
     uint index = again_index(uvec2(stratum));
-    shadow_record r = records[index];
+    shadow_record r = record_at(index);
     if (r.light <= 0.0)
         return n;
     // What is seen at a grazing angle is far apart: records of one plane count wherever they are.
@@ -180,11 +189,11 @@ void main()
     ivec2 stratum = ivec2(gl_GlobalInvocationID.xy);
     if (any(greaterThanEqual(stratum, ivec2(again_size()))))
         return;
-    shadow_record center = records[again_index(uvec2(stratum))];
+    shadow_record center = record_at(again_index(uvec2(stratum)));
     // Without a record of its own the stratum goes by one next to it.
     for (int i = 0; i < 9 && center.light <= 0.0; i++) {
         ivec2 next = clamp(stratum + ivec2(i % 3, i / 3) - 1, ivec2(0), ivec2(again_size()) - 1);
-        center = records[again_index(uvec2(next))];
+        center = record_at(again_index(uvec2(next)));
     }
     finding found = finding(0.0, 0.0, 1.0, UNLIMITED);
     if (center.light > 0.0)

@@ -15,6 +15,7 @@ layout(set = 0, binding = 5, scalar) writeonly buffer light_block { float light_
 layout(push_constant, scalar) uniform push_block {
     uint slot_count;
     float singularity; // b, metres
+    uint records_valid;
 } push;
 
 void main()
@@ -23,7 +24,7 @@ void main()
     if (index >= again_size().x * again_size().y)
         return;
     shadow_record r = records[index];
-    if (r.light <= 0.0) {
+    if (push.records_valid == 0u || r.light <= 0.0) {
         ray_write_none(index);
         return;
     }

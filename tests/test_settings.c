@@ -243,6 +243,28 @@ TEST(a_long_value_is_cut_in_the_message)
 
 #define RUN_FRESH(name) (settings = render_settings_default(), RUN(name))
 
+TEST(settings_are_equal_by_their_values)
+{
+    const render_settings defaults = render_settings_default();
+    render_settings a, b; // of different padding
+    memset(&a, 0, sizeof a);
+    memset(&b, 0xff, sizeof b);
+    uint32_t count;
+    const setting_info *table = settings_table(&count);
+    for (uint32_t i = 0; i < count; i++) {
+        char text[32];
+        setting_error error;
+        settings_get(&defaults, &table[i], text);
+        CHECK(settings_set(&a, &table[i], text, &error) && settings_set(&b, &table[i], text, &error));
+    }
+    CHECK(settings_equal(&a, &b) && settings_equal(&a, &defaults));
+    b.alpha = nextafterf(b.alpha, 2);
+    CHECK(!settings_equal(&a, &b));
+    b = a;
+    b.height++;
+    CHECK(!settings_equal(&a, &b));
+}
+
 int main(void)
 {
     RUN_FRESH(defaults_are_the_documented_ones);
@@ -261,5 +283,6 @@ int main(void)
     RUN_FRESH(switches_take_no_value_or_a_truth_value);
     RUN_FRESH(an_option_without_its_value_is_refused);
     RUN_FRESH(a_long_value_is_cut_in_the_message);
+    RUN(settings_are_equal_by_their_values);
     return test_end();
 }
