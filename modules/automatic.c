@@ -42,7 +42,7 @@ static render_settings choice_of(const render_settings *base, uint32_t index)
     index /= INTERLEAVE_CHOICES;
     const double rays = exp2((double)index - 2);
     s.shadow_samples = (uint32_t)ceil(rays);
-    s.ray_budget = rays < 1 ? (float)rays : 0;
+    s.ray_budget = rays < 1 && base->filter ? (float)rays : 0; // a budget goes by what the filter knows
     return s;
 }
 

@@ -78,7 +78,7 @@ static void rays_declare(renderer *r, const probe_state *state, uint32_t count)
     frame_graph_create_resource(pass, "probe_estimates", &estimates, ACCESS_STORAGE_WRITE);
 }
 
-// What is shown is read as the composite reads it.
+// What is shown is read as the composite reads it (composite.c).
 static void sum_declare(renderer *r, const probe_state *state, uint32_t count)
 {
     const probe_dispatch d = {
@@ -91,8 +91,9 @@ static void sum_declare(renderer *r, const probe_state *state, uint32_t count)
     frame_graph_read(pass, "probe_estimates", ACCESS_STORAGE_READ);
     frame_graph_read(pass, "probe_visible", ACCESS_STORAGE_READ);
     frame_graph_read(pass, "albedo", ACCESS_SAMPLED);
-    frame_graph_read(pass, "indirect_gathered|indirect|black", ACCESS_SAMPLED);
-    frame_graph_read(pass, "shadow_ratio|white", ACCESS_SAMPLED);
+    const bool steadied = r->settings.taa && r->settings.taa_target == TAA_LIGHT;
+    frame_graph_read(pass, steadied ? "shadow_steadied" : "indirect_gathered|indirect|black", ACCESS_SAMPLED);
+    frame_graph_read(pass, steadied ? "white" : "shadow_ratio|shadow_ratio_now|white", ACCESS_SAMPLED);
     frame_graph_modify(pass, "probes_unseen", "probes", ACCESS_STORAGE_READ_WRITE);
     frame_graph_export(r->graph, "probes", ACCESS_HOST_READ);
 }

@@ -79,10 +79,12 @@ static size_t pixel_of(const probe *p)
 
 // ---- Probes
 
-TEST(probes_sum_every_vpl_and_see_what_is_shown)
+static void check_probes(bool taa, uint32_t taa_target)
 {
     render_settings settings = small_settings(3000);
     settings.interleave = 2;
+    settings.taa = taa;
+    settings.taa_target = taa_target;
     renderer *r = renderer_of(&settings);
     r->probes = true;
     const truth t = truth_make(r, &shader_brute_force_comp);
@@ -104,6 +106,13 @@ TEST(probes_sum_every_vpl_and_see_what_is_shown)
     free(t.radiance);
     free(radiance);
     renderer_destroy(r);
+}
+
+TEST(probes_sum_every_vpl_and_see_what_is_shown)
+{
+    check_probes(true, TAA_RATIO);
+    check_probes(true, TAA_LIGHT);
+    check_probes(false, TAA_RATIO);
 }
 
 // Mean of a series, and by how many of its standard errors it is off what is expected.
@@ -276,6 +285,35 @@ TEST(automatic_settings_follow_whom_they_belong_to)
     renderer_destroy(r);
 }
 
+// Budgets below a ray a pixel go by what the filter knows.
+TEST(what_is_chosen_without_the_filter_can_be_rendered)
+{
+    render_settings settings = small_settings(1000);
+    settings.filter = false;
+    settings.target_ms = 0.1f; // the cheapest there is
+    renderer *r = renderer_of(&settings);
+    while (r->frame < 30 && !r->failed)
+        renderer_frame(r);
+    CHECK(!r->failed && automatic_get(r)->current.vpls < 1000);
+    renderer_destroy(r);
+}
+
+// At rest passes are left out: what is measured then says nothing of what settings cost.
+TEST(a_picture_at_rest_keeps_its_settings)
+{
+    render_settings settings = small_settings(1000);
+    settings.target_error = 0.9f;
+    renderer *r = renderer_of(&settings);
+    while (r->frame < 600 && !renderer_is_settled(r))
+        CHECK(renderer_frame(r));
+    CHECK(renderer_is_settled(r));
+    const uint32_t frame = automatic_get(r)->frame;
+    for (int i = 0; i < 5; i++)
+        CHECK(renderer_frame(r));
+    CHECK(automatic_get(r)->frame == frame && renderer_is_settled(r));
+    renderer_destroy(r);
+}
+
 TEST(validation_layer_is_silent)
 {
     CHECK(gpu_validation_messages(device) == 0);
@@ -297,6 +335,8 @@ int main(void)
     RUN(eight_vpls_build_few_levels);
     RUN(target_error_settles_the_same_way_every_time);
     RUN(automatic_settings_follow_whom_they_belong_to);
+    RUN(what_is_chosen_without_the_filter_can_be_rendered);
+    RUN(a_picture_at_rest_keeps_its_settings);
     RUN(validation_layer_is_silent);
     scene_destroy(cornell);
     gpu_destroy(device);
