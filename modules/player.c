@@ -43,19 +43,6 @@ static void matrix_look(const float position[3], const float direction[3], float
     matrix[15] = 1;
 }
 
-static void matrix_of_trs(const float translation[3], const float rotation[4], const float scale[3], float matrix[16])
-{
-    versor quaternion; // over-aligned, so copies
-    mat4 made;
-    memcpy(quaternion, rotation, sizeof(quaternion));
-    glm_quat_mat4(quaternion, made);
-    for (int column = 0; column < 3; column++) {
-        glm_vec4_scale(made[column], scale[column], made[column]);
-    }
-    glm_vec3_copy((float *)translation, made[3]);
-    memcpy(matrix, made, sizeof(made));
-}
-
 static void nodes_place(player *p, double time)
 {
     for (uint32_t i = 0; i < p->script->node_count; i++) {
@@ -76,7 +63,7 @@ static void nodes_place(player *p, double time)
         }
         node_component *const node = ecs_get(p->renderer->world, p->renderer->gpu_world->node_entities[track->node],
                                              p->renderer->gpu_world->node);
-        matrix_of_trs(translation, rotation, scale, node->matrix);
+        scene_matrix_compose(translation, rotation, scale, node->matrix);
     }
 }
 
@@ -109,19 +96,35 @@ static bool node_is_below(const scene_data *scene, uint32_t node, uint32_t ances
     return node == ancestor;
 }
 
-static void node_switch(player *p, uint32_t top, bool visible)
+// The last event so far that reaches the node decides.
+static bool node_is_visible(const player *p, uint32_t node, uint32_t frame)
 {
-    const renderer *const r = p->renderer;
+    bool visible = true;
+    for (uint32_t i = 0; i < p->script->event_count && p->script->events[i].frame <= frame; i++) {
+        const playback_event *const event = &p->script->events[i];
+        if (event->type == PLAYBACK_NODE_SWITCH && node_is_below(p->scene, node, event->node)) {
+            visible = event->on;
+        }
+    }
+    return visible;
+}
+
+// A mesh that stays keeps its component, whose level of subdivision has a history.
+static void nodes_switch(player *p, uint32_t frame)
+{
+    const world_gpu *const w = p->renderer->gpu_world;
     for (uint32_t i = 0; i < p->scene->node_count; i++) {
         const uint32_t mesh = p->scene->nodes[i].mesh;
-        if (mesh == SCENE_NONE || !node_is_below(p->scene, i, top)) {
+        if (mesh == SCENE_NONE) {
             continue;
         }
-        if (visible) {
-            *(mesh_component *)ecs_add(r->world, p->renderer->gpu_world->node_entities[i], r->gpu_world->mesh) =
-                (mesh_component){mesh};
-        } else {
-            ecs_remove(r->world, p->renderer->gpu_world->node_entities[i], r->gpu_world->mesh);
+        ecs_world *const world = p->renderer->world;
+        const entity node = w->node_entities[i];
+        const bool visible = node_is_visible(p, i, frame);
+        if (!visible) {
+            ecs_remove(world, node, w->mesh);
+        } else if (!ecs_get(world, node, w->mesh)) {
+            *(mesh_component *)ecs_add(world, node, w->mesh) = (mesh_component){mesh};
         }
     }
 }
@@ -147,15 +150,12 @@ static void light_switch(player *p, const playback_event *event, bool on)
     }
 }
 
-static void switches_set(player *p, uint32_t frame)
+static void lights_switch(player *p, uint32_t frame)
 {
     for (uint32_t i = 0; i < p->script->event_count; i++) {
         const playback_event *const event = &p->script->events[i];
-        const bool on = playback_switched_on(p->script, event, frame);
         if (event->type == PLAYBACK_LIGHT_SWITCH) {
-            light_switch(p, event, on);
-        } else if (event->type == PLAYBACK_NODE_SWITCH) {
-            node_switch(p, event->node, on);
+            light_switch(p, event, playback_switched_on(p->script, event, frame));
         }
     }
 }
@@ -268,7 +268,8 @@ bool player_frame(player *p, uint32_t frame)
     r->time = time;
     nodes_place(p, time);
     lights_set(p, frame);
-    switches_set(p, frame);
+    lights_switch(p, frame);
+    nodes_switch(p, frame);
     animation_update(r);
     camera_set(p, frame);
     const bool ok = progressive_is(r) ? progressive_frames_render(r) : renderer_frame(r);

@@ -185,9 +185,27 @@ if [ -s "$truck" ]; then
     # At 0 and 0.1 s the clip is at its beginning.
     [ "$pictures" = $((${#clips} > 0 ? 3 : 1)) ] || fail "$pictures different pictures with clips \"$clips\""
   done
+  # A part that is hidden before the whole, or after it. At first all is shown; then the part is hidden, or the whole.
+  for events in 'Wheels 0.1 Yup2Zup 0.2' 'Yup2Zup 0.1 Wheels 0.2'; do
+    read -r first at then after <<<"$events"
+    printf '{"scene": "%s", "duration": 0.4, "frame_rate": 10, "lights": [{"name": "sun", "type": "directional",
+      "intensity": 50, "direction": [-1, -1, -0.5]}], "events": [{"time": %s, "node": "%s", "visible": false},
+      {"time": %s, "node": "%s", "visible": false}]}' "$truck" "$at" "$first" "$after" "$then" >"$work/truck.json"
+    plays "$work/truck.json" -o "$work/hidden$first" --method path --spp 1 --size 96x54
+    pictures=$(cd "$work/hidden$first" && sha256sum frame_*.png | cut -d' ' -f1 | uniq -c | awk '{ printf "%s ", $1 }')
+    [ "$pictures" = "$([ "$first" = Wheels ] && echo '1 1 2 ' || echo '1 3 ')" ] || fail "$events hidden: $pictures"
+  done
 else
-  echo "skipped: clips, as there is no $truck"
+  echo "skipped: clips and parts that are hidden, as there is no $truck"
 fi
+
+echo "a still view comes to rest"
+printf '{"scene": "%s/cornell.glb", "duration": 7, "frame_rate": 10, "size": "16x16", "settings": {"vpls": 300}}' \
+  "$scenes" >"$work/still.json"
+plays "$work/still.json" -o "$work/still" --outputs exr
+[ "$(cd "$work/still" && sha256sum frame_000066.exr frame_00006[789].exr | cut -d' ' -f1 | uniq | wc -l)" = 1 ] ||
+  fail "frames 66 to 69 differ"
+cmp -s "$work/still/frame_000002.exr" "$work/still/frame_000066.exr" && fail "frames 2 and 66 do not differ"
 
 echo "what automatic settings chose plays to the same bytes"
 plays "$script" -o "$work/chosen" --target-ms 3 --record "$work/chosen.json"
