@@ -92,6 +92,14 @@ static uint64_t nodes_hash(const scene_data *s)
         hash = hash_bytes(hash, node->world, sizeof(node->world));
         hash = hash_word(hash, node->mesh);
         hash = hash_word(hash, node->light);
+        hash = hash_word(hash, node->parent);
+        hash = hash_bytes(hash, node->matrix, sizeof(node->matrix));
+    }
+    for (uint32_t i = 0; i < s->camera_count; i++) {
+        const scene_camera *const camera = &s->cameras[i];
+        hash = hash_word(hash, camera->node);
+        hash = hash_bytes(hash, &camera->yfov, sizeof(camera->yfov));
+        hash = hash_bytes(hash, &camera->near_plane, sizeof(camera->near_plane));
     }
     return hash;
 }
@@ -139,7 +147,7 @@ void scene_identity_print(FILE *out, const scene_data *scene)
         uint64_t (*hash)(const scene_data *scene);
     } parts[] = {
         {"geometry", geometry_hash}, {"nodes", nodes_hash},   {"materials", materials_hash},
-        {"textures", textures_hash}, {"lights", lights_hash},
+        {"textures", textures_hash}, {"lights", lights_hash}, {"animations", animations_hash},
     };
     for (size_t i = 0; i < countof(parts); i++) {
         fprintf(out, "%s %016llx\n", parts[i].name, (unsigned long long)parts[i].hash(scene));
@@ -149,10 +157,9 @@ void scene_identity_print(FILE *out, const scene_data *scene)
     }
 }
 
-static void motion_print(FILE *out, const scene_data *scene, const render_request *request)
+static void motion_print(FILE *out, const render_request *request)
 {
     if (request->animation) {
-        fprintf(out, "animations %016llx\n", (unsigned long long)animations_hash(scene));
         fprintf(out, "animation %s\ntime %.9g\n", request->animation, (double)request->time);
     }
 }
@@ -199,9 +206,11 @@ static bool setting_matters(uint32_t method, const char *name)
     // What LGH does not read, or what only changes how the PNG shows it. Who traces rays changes rounding alone.
     static const char *const not_lgh[] = {"rays", "spp", "until", "ir-vpls", "exposure", NULL};
     // How long a progressive picture is continued is no part of what it is.
-    static const char *const path[] = {"size", "method", "bounces", "only", "seed", NULL};
-    static const char *const vpl[] = {"size", "method", "vpls", "bounces", "singularity", "only", "seed", NULL};
-    static const char *const ir[] = {"size", "method", "ir-vpls", "bounces", "singularity", "only", "seed", NULL};
+    static const char *const path[] = {"size", "method", "bounces", "subdivision-max", "only", "seed", NULL};
+    static const char *const vpl[] = {"size", "method", "vpls", "bounces", "singularity", "subdivision-max",
+                                      "only", "seed",   NULL};
+    static const char *const ir[] = {"size", "method", "ir-vpls", "bounces", "singularity", "subdivision-max",
+                                     "only", "seed",   NULL};
     switch ((render_method)method) {
     case METHOD_LGH:
         return !name_is_in(not_lgh, name);
@@ -239,7 +248,7 @@ char *render_identity(const render_session *session, const render_request *reque
     assert(out);
     fputs("program lanternfield " LANTERNFIELD_VERSION "\n", out);
     scene_identity_print(out, session->scene);
-    motion_print(out, session->scene, request);
+    motion_print(out, request);
     view_print(out, &session->renderer->camera, request);
     settings_print(out, &session->renderer->settings);
     fclose(out);

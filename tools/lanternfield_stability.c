@@ -195,11 +195,11 @@ static char *references_folder_make(const stability_run *run)
     char *text = NULL, *folder = NULL, key[BENCH_KEY_SIZE];
     size_t size = 0;
     FILE *const out = open_memstream(&text, &size);
-    fprintf(out, "version 1\nscript %016llx\n%s %u\n", (unsigned long long)run->script->hash,
+    fprintf(out, "version 2\nscript %016llx\n%s %u\n", (unsigned long long)run->script->hash,
             request->reference_spp ? "spp" : "vpls",
             request->reference_spp ? request->reference_spp : request->reference_vpls);
     scene_identity_print(out, run->session.scene);
-    static const char *const parts[] = {"size", "bounces", "singularity", "seed", "only"};
+    static const char *const parts[] = {"size", "bounces", "singularity", "subdivision-max", "seed", "only", "until"};
     for (size_t i = 0; i < countof(parts); i++) {
         char value[32];
         const render_settings settings = playback_settings_at(run->script, 0);
