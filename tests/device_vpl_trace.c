@@ -404,8 +404,8 @@ TEST(a_sun_that_turns_leaves_the_lights_on_the_ground_where_they_are)
     pair_destroy(&p);
 }
 
-// A floor's VPLs carry albedo / pi of what falls on it, evenly spread. Something small high above it makes the shadow of
-// the scene's bounds larger than the bounds.
+// A floor's VPLs carry albedo / pi of what falls on it, evenly spread. Something small high above it makes the shadow
+// of the scene's bounds larger than the bounds.
 TEST(a_sun_lights_a_floor_evenly)
 {
     static quad_scene quads;
