@@ -141,7 +141,7 @@ uint32_t renderer_light_slots(const renderer *r);
 uint32_t renderer_slots(const renderer *r); // both
 bool renderer_has_shadows(const renderer *r); // indirect light with shadow samples
 // The picture has been still for so long that its history is full: no samples are taken any more, and each frame is the
-// one before to the bit, but for TAA. STILL_SAMPLES a pixel are behind it.
+// one before to the bit. STILL_SAMPLES a pixel are behind it.
 enum { STILL_SAMPLES = 64 };
 bool renderer_is_settled(const renderer *r);
 // b in metres: no light's singularity is closer than this.
