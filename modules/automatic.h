@@ -18,9 +18,9 @@
 // The models are crude; their scales are fitted to what is measured with the settings in use, so that a choice made
 // from them is corrected by the next measurement. It changes nothing while the target is met but for a clear gain,
 // never before the frames since the last change tell enough, and waits longer after each change: so it cannot
-// oscillate. But a time that was met and then left, as along a camera's way, is followed without that wait. A picture at
-// rest, which leaves passes out, is not measured. With a target error nothing depends on time: the same scene takes the
-// same way.
+// oscillate. But a time that was met and then left, as along a camera's way, is followed without that wait. A picture
+// at rest, which leaves passes out, is not measured. With a target error nothing depends on time: the same scene takes
+// the same way.
 #pragma once
 
 #include "settings.h"
