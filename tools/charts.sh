@@ -26,14 +26,15 @@ swinging_door 28:76 --reference-spp 64
 still 88:120 --reference-spp 64
 light_switch 28:60 --reference-spp 32
 fast_pan 0:16 --reference-vpls 20000
-lanterns 16:24 --reference-spp 32
+lanterns 16:24 --reference-vpls 5000
 dancers 30:40 --reference-spp 32
 '
 
 # One page for all scripts: tables, and the flicker over the frames.
 motion() {
-  local page=docs/charts/motion.md script range reference
-  cat > "$page.part" <<END
+  local page=build/charts/motion.md script range reference
+  mkdir -p build/charts
+  cat > "$page" <<END
 # Motion
 
 \`lanternfield stability\` plays a script with TAA on the shadow ratio, which is the default, on the shadowed light, which
@@ -56,9 +57,9 @@ END
     cp "$out/flicker.svg" "docs/charts/motion-$script.svg"
     { printf '\n## %s, frames %s, %s\n\n' "$script" "$range" "${reference#--reference-}"
       grep '^|' "$out/report.md"
-      printf '\n![Flicker by frame](motion-%s.svg)\n' "$script"; } >> "$page.part"
+      printf '\n![Flicker by frame](motion-%s.svg)\n' "$script"; } >> "$page"
   done <<<"$motion_scripts"
-  mv "$page.part" "$page"
+  mv "$page" docs/charts/motion.md
 }
 
 mkdir -p docs/charts
