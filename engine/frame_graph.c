@@ -220,9 +220,11 @@ static history *history_find(frame_graph *graph, const char *name)
 
 static bool history_acquire(frame_graph *graph, const frame_graph_plan_resource *resource, physical *physical)
 {
+    // All objects can be copied, so that an export more or less costs no history; of images and buffers alike.
+    const VkFlags transfers = VK_IMAGE_USAGE_TRANSFER_SRC_BIT | VK_IMAGE_USAGE_TRANSFER_DST_BIT;
     history *const history = history_find(graph, resource->name);
     const bool fits = object_exists(history->objects[0]) && object_exists(history->objects[1]) &&
-                      desc_equal(&history->desc, &resource->desc) && !(resource->usage & ~history->usage);
+                      desc_equal(&history->desc, &resource->desc) && !(resource->usage & ~(history->usage | transfers));
     if (!fits) {
         history->written = false;
         history->desc = resource->desc;
