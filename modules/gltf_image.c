@@ -10,6 +10,8 @@
 
 enum { IMAGE_SIZE_MAX = 16384, IMAGE_TEXELS_MAX = 1 << 27, THREADS_MAX = 16 };
 
+#define ALL_TEXELS_MAX (1ll << 30) // of a file: 4 GiB
+
 typedef struct image_job {
     gltf_bytes encoded;
     uint8_t *owned; // NULL: the bytes lie in a buffer
@@ -50,6 +52,22 @@ static const char *image_decode(gltf_bytes bytes, scene_image *image)
     image->width = (uint32_t)width;
     image->height = (uint32_t)height;
     return image->texels ? NULL : "broken or truncated";
+}
+
+// What the headers claim, of images that can be decoded: small files may not ask for all memory.
+static int64_t texels_claimed(const image_queue *queue)
+{
+    int64_t sum = 0;
+    for (uint32_t i = 0; i < queue->count; i++) {
+        const gltf_bytes bytes = queue->jobs[i].encoded;
+        int width = 0, height = 0, channels;
+        if (is_png_or_jpeg(bytes) && bytes.size <= INT32_MAX &&
+            stbi_info_from_memory(bytes.data, (int)bytes.size, &width, &height, &channels) && width <= IMAGE_SIZE_MAX &&
+            height <= IMAGE_SIZE_MAX) {
+            sum += (int64_t)width * height;
+        }
+    }
+    return sum;
 }
 
 static void *queue_work(void *argument)
@@ -94,6 +112,10 @@ bool gltf_images_decode(const gltf_file *file, const gltf_image_source *const *s
             job->encoded.data = job->owned;
             ok = job->owned != NULL;
         }
+    }
+    const int64_t texels = ok ? texels_claimed(&queue) : 0;
+    if (texels > ALL_TEXELS_MAX) {
+        ok = gltf_fail(file, "images: expected at most 2^30 texels in all, got %lld", (long long)texels);
     }
     if (ok) {
         queue_run(&queue);

@@ -36,8 +36,7 @@ static void add_scaled(float out[3], const float v[3], float scale)
     }
 }
 
-// False, and `v` as it was, when it has no direction. Scaled first, so that no length over- or underflows.
-static bool normalize(float v[3])
+bool scene_normalize(float v[3])
 {
     const float largest = fmaxf(fabsf(v[0]), fmaxf(fabsf(v[1]), fabsf(v[2])));
     if (!(largest > 0 && largest < INFINITY) || !isfinite(v[0] + v[1] + v[2])) {
@@ -159,7 +158,7 @@ static void flat_normal(const gltf_primitive *p, uint32_t first, const scene_mor
     subtract(corners[1], corners[0], edge1);
     subtract(corners[2], corners[0], edge2);
     cross(edge1, edge2, normal);
-    if (!normalize(normal)) {
+    if (!scene_normalize(normal)) {
         memcpy(normal, (const float[3]){0, 1, 0}, 3 * sizeof(float));
     }
 }
@@ -199,8 +198,8 @@ static void normals_repair(gltf_primitive *p)
     static const float up[3] = {0, 1, 0};
     for (uint32_t i = 0; i < p->vertex_count; i++) {
         float *const normal = p->attributes[i].normal;
-        if (!normalize(normal)) {
-            memcpy(normal, normalize(sums[i]) ? sums[i] : up, sizeof(up));
+        if (!scene_normalize(normal)) {
+            memcpy(normal, scene_normalize(sums[i]) ? sums[i] : up, sizeof(up));
         }
     }
     free(sums);
@@ -211,7 +210,7 @@ static void tangents_repair(gltf_primitive *p)
 {
     for (uint32_t i = 0; i < p->vertex_count; i++) {
         float *const tangent = p->attributes[i].tangent;
-        tangent[3] = !normalize(tangent) ? 0.0f : tangent[3] < 0 ? -1.0f : 1.0f;
+        tangent[3] = !scene_normalize(tangent) ? 0.0f : tangent[3] < 0 ? -1.0f : 1.0f;
     }
 }
 
@@ -242,7 +241,7 @@ static void tangent_accumulate(const gltf_primitive *p, const uint32_t *triangle
     add_scaled(u, edge2, -sign * dv1);
     add_scaled(v, edge1, sign * du2);
     add_scaled(v, edge2, -sign * du1);
-    if (!normalize(u) || !normalize(v)) {
+    if (!scene_normalize(u) || !scene_normalize(v)) {
         return;
     }
     cross(edge1, edge2, normal);
@@ -266,7 +265,7 @@ static void tangents_make(gltf_primitive *p, const texture_reference *map)
         float tangent[3], bitangent[3];
         memcpy(tangent, along_u[i], sizeof(tangent));
         add_scaled(tangent, vertex->normal, -dot(tangent, vertex->normal));
-        const bool usable = normalize(tangent);
+        const bool usable = scene_normalize(tangent);
         cross(vertex->normal, tangent, bitangent);
         memcpy(vertex->tangent, tangent, sizeof(tangent));
         vertex->tangent[3] = !usable ? 0.0f : dot(bitangent, against_v[i]) < 0 ? -1.0f : 1.0f;
@@ -316,12 +315,15 @@ void scene_warning(scene_data *scene, const char *format, ...)
     va_end(arguments);
     log_warning("\"%s\": %s", scene->path, message);
 
-    char **const warnings = arena_alloc(&scene->arena, (scene->warning_count + 1) * sizeof(*warnings));
-    for (uint32_t i = 0; i < scene->warning_count; i++) {
-        warnings[i] = scene->warnings[i];
+    const uint32_t count = scene->warning_count++;
+    if ((count & (count - 1)) == 0) { // the arena frees nothing, so the array doubles
+        char **const warnings = arena_alloc(&scene->arena, (count > 0 ? 2 * count : 1) * sizeof(*warnings));
+        for (uint32_t i = 0; i < count; i++) {
+            warnings[i] = scene->warnings[i];
+        }
+        scene->warnings = warnings;
     }
-    warnings[scene->warning_count++] = arena_strdup(&scene->arena, message);
-    scene->warnings = warnings;
+    scene->warnings[count] = arena_strdup(&scene->arena, message);
 }
 
 static void primitive_finish(gltf_primitive *p, const material *m)

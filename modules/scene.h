@@ -233,6 +233,8 @@ void scene_primitive_reorder(uint32_t *indices, uint32_t index_count, const floa
 
 // The matrices of nodes: column-major; the rotation is a unit quaternion x y z w.
 void scene_matrix_multiply(const float a[16], const float b[16], float out[16]); // `out` may be neither
+// False, and `v` as it was, when it has no direction. Scaled first, so that no length over- or underflows.
+bool scene_normalize(float v[3]);
 void scene_matrix_compose(const float translation[3], const float rotation[4], const float scale[3], float out[16]);
 
 // What `lanternfield info` prints.

@@ -443,11 +443,16 @@ static vertex_attributes attributes_make(const float value[SUBDIVISION_VALUES], 
 static gltf_primitive level_primitive(const cage_builder *b, const subdivision *s, const subdivision_level *level,
                                       const limit_point *points, uint32_t which)
 {
+    uint32_t triangles = 0;
+    for (uint32_t i = 0; i < level->triangle_count; i++) {
+        triangles += b->face_primitives[level->faces[i]] == which;
+    }
+    const uint32_t vertices = min_u32(level->vertex_count, 3 * triangles);
     gltf_primitive out = {
-        .positions = memory_alloc(level->vertex_count * sizeof(*out.positions)),
-        .attributes = memory_alloc(level->vertex_count * sizeof(*out.attributes)),
-        .indices = memory_alloc(3 * level->triangle_count * sizeof(*out.indices)),
-        .tags = memory_alloc(level->vertex_count * sizeof(*out.tags)),
+        .positions = memory_alloc(vertices * sizeof(*out.positions)),
+        .attributes = memory_alloc(vertices * sizeof(*out.attributes)),
+        .indices = memory_alloc(3 * (size_t)triangles * sizeof(*out.indices)),
+        .tags = memory_alloc(vertices * sizeof(*out.tags)),
         .has_normals = true,
     };
     uint32_t *const number_of = memory_alloc(level->vertex_count * sizeof(*number_of)); // plus one

@@ -95,7 +95,7 @@ entity world_sun_add(renderer *r, const float direction[3], float lux)
     const entity e = ecs_entity_create(r->world);
     float x[3], y[3], z[3]; // light shines along -z
     glm_vec3_negate_to((float *)direction, z);
-    glm_vec3_normalize(z);
+    scene_normalize(z);
     glm_vec3_ortho(z, x);
     glm_vec3_normalize(x);
     glm_vec3_cross(z, x, y);

@@ -241,8 +241,9 @@ static punctual_light light_make(const light_component *light, const float world
     punctual_light made = {.type = light->type};
     memcpy(made.color, light->color, sizeof made.color);
     memcpy(made.position, world + 12, sizeof made.position);
-    const float axis[3] = {-world[8], -world[9], -world[10]};
-    glm_vec3_normalize_to((float *)axis, made.direction);
+    glm_vec3_negate_to((float *)world + 8, made.direction);
+    if (!scene_normalize(made.direction) && light->type != LIGHT_POINT)
+        memset(made.color, 0, sizeof made.color); // a node without extent points nowhere
     if (light->type == LIGHT_SPOT) { // KHR_lights_punctual
         const float inner = cosf(light->inner_cone), outer = cosf(light->outer_cone);
         made.spot_scale = 1 / fmaxf(0.001f, inner - outer);
@@ -267,7 +268,7 @@ static float projected_area(const frame_constants *c, const float n[3])
 // Luminous flux; of spots an estimate between the two cones, of suns what enters the scene's bounds.
 static float light_power(const frame_constants *c, const light_component *light, const punctual_light *made)
 {
-    const float intensity = luminance(light->color);
+    const float intensity = luminance(made->color);
     switch (light->type) {
     case LIGHT_POINT:
         return 4 * GLM_PIf * intensity;

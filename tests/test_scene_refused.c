@@ -357,6 +357,21 @@ TEST(an_image_that_cannot_be_decoded_is_refused_by_name)
     }
 }
 
+// 2^27 texels by the header, nine times.
+TEST(images_that_are_large_in_all_are_refused_before_they_are_decoded)
+{
+    test_file("large.png", "\x89PNG\r\n\x1a\n\0\0\0\rIHDR\0\0\x40\0\0\0\x20\0\x8\2\0\0\0\x90wS\xde", 33);
+    char materials[1024] = "", textures[512] = "", images[512] = "", members[4096];
+    for (int i = 0; i < 9; i++) {
+        const char *const comma = i > 0 ? "," : "";
+        snprintf(materials + strlen(materials), 64, "%s{'emissiveTexture':{'index':%d}}", comma, i);
+        snprintf(textures + strlen(textures), 32, "%s{'source':%d}", comma, i);
+        snprintf(images + strlen(images), 32, "%s{'uri':'large.png'}", comma);
+    }
+    snprintf(members, sizeof members, "'materials':[%s],'textures':[%s],'images':[%s]", materials, textures, images);
+    REFUSED(members, "at most 2^30 texels in all");
+}
+
 TEST(a_view_past_its_buffer_is_refused_for_images_too)
 {
     REFUSED("'materials':[{'emissiveTexture':{'index':0}}],'textures':[{'source':0}],'images':[{'bufferView':1}]",
@@ -390,6 +405,7 @@ int main(void)
     RUN(a_buffer_file_that_is_too_short_is_refused_by_name);
     RUN(a_buffer_that_is_a_directory_or_a_pipe_is_refused);
     RUN(broken_base64_is_refused);
+    RUN(images_that_are_large_in_all_are_refused_before_they_are_decoded);
     RUN(a_view_past_its_buffer_is_refused);
     RUN(a_view_of_no_buffer_is_refused);
     RUN(an_accessor_past_its_view_is_refused);
