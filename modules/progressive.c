@@ -87,6 +87,10 @@ static uint64_t key_of(const renderer *r)
         hash = hash_add(hash, w->instance_data[i].world, sizeof w->instance_data[i].world);
         hash = hash_add(hash, &w->instance_data[i].mesh, sizeof w->instance_data[i].mesh);
     }
+    for (uint32_t i = 0; i < r->scene->material_count; i++) {
+        hash = hash_add(hash, w->material_data[i].base_color, sizeof w->material_data[i].base_color);
+        hash = hash_add(hash, w->material_data[i].emissive, sizeof w->material_data[i].emissive);
+    }
     for (uint32_t i = 0; i < r->scene->deformation_count; i++)
         hash = pose_hash(hash, r, i);
     return hash;

@@ -74,10 +74,11 @@ static bool row_errors_measure(bench_run *run, bench_row *row, uint32_t referenc
     if (!bench_hash_file(path, &hashes[0]) || !bench_hash_file(result->image, &hashes[1])) {
         return false;
     }
-    char keys[2][BENCH_KEY_SIZE];
+    char keys[3][BENCH_KEY_SIZE];
     bench_key_print(hashes[0], keys[0]);
     bench_key_print(hashes[1], keys[1]);
-    const char *const key = arena_printf(&run->memory, "%s-%s", keys[0], keys[1]);
+    bench_key_print(run->program, keys[2]); // which measures
+    const char *const key = arena_printf(&run->memory, "%s-%s-%s", keys[0], keys[1], keys[2]);
     size_t place = 0;
     const cJSON *const known = bench_journal_next(run->journal, "errors", key, &place);
     image_measures measures = {0};

@@ -106,7 +106,8 @@ static uint64_t nodes_hash(const scene_data *s)
 
 static uint64_t materials_hash(const scene_data *s)
 {
-    return hash_bytes(hash_start, s->materials, s->material_count * sizeof(*s->materials));
+    const uint64_t hash = hash_bytes(hash_start, s->materials, s->material_count * sizeof(*s->materials));
+    return hash_bytes(hash, s->emissions, s->emissions ? s->material_count * sizeof(*s->emissions) : 0);
 }
 
 static uint64_t textures_hash(const scene_data *s)
@@ -132,8 +133,8 @@ static uint64_t lights_hash(const scene_data *s)
     uint64_t hash = hash_start;
     for (uint32_t i = 0; i < s->light_count; i++) {
         const scene_light *const light = &s->lights[i];
-        const float values[] = {light->color[0], light->color[1], light->color[2], light->inner_cone,
-                                light->outer_cone};
+        const float values[] = {light->color[0], light->color[1],  light->color[2],   light->hue[0],    light->hue[1],
+                                light->hue[2],   light->intensity, light->inner_cone, light->outer_cone};
         hash = hash_word(hash, light->type);
         hash = hash_bytes(hash, values, sizeof(values));
     }

@@ -345,7 +345,7 @@ static bool settling_frames_render(render_state *state)
     const uint32_t frames = r->settings.method == METHOD_IR ? 1 : r->settings.frames;
     const bool wants_count = wants_light_count(state->request);
     bool last = false;
-    while (!last && !interrupted) {
+    do { // once at least, so that there is a picture
         progress_show_frame(state->frames_done, frames, state->seconds);
         last = state->frames_done + 1 == frames || (automatic_get(r) && automatic_get(r)->settled);
         // Counting costs time, so only the last frame does, and is left out of the timings.
@@ -353,7 +353,7 @@ static bool settling_frames_render(render_state *state)
         if (!frame_render(state, !r->count_lights || frames == 1)) {
             return false;
         }
-    }
+    } while (!last && !interrupted);
     automatic_tell(r);
     return frames == 1 || aovs_check(state);
 }

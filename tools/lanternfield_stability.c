@@ -199,10 +199,11 @@ static char *references_folder_make(const stability_run *run)
             request->reference_spp ? "spp" : "vpls",
             request->reference_spp ? request->reference_spp : request->reference_vpls);
     scene_identity_print(out, run->session.scene);
+    const render_settings settings = playback_settings_at(run->script, 0);
+    fprintf(out, "shadows %d\n", settings.shadow_samples > 0);
     static const char *const parts[] = {"size", "bounces", "singularity", "subdivision-max", "seed", "only", "until"};
     for (size_t i = 0; i < countof(parts); i++) {
         char value[32];
-        const render_settings settings = playback_settings_at(run->script, 0);
         settings_get(&settings, settings_find(parts[i]), value);
         fprintf(out, "%s %s\n", parts[i], value);
     }
