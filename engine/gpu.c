@@ -320,8 +320,8 @@ static bool device_has_subgroups(VkPhysicalDevice device)
         .pNext = &subgroups,
     };
     vkGetPhysicalDeviceProperties2(device, &properties);
-    const VkSubgroupFeatureFlags needed =
-        VK_SUBGROUP_FEATURE_ARITHMETIC_BIT | VK_SUBGROUP_FEATURE_BALLOT_BIT | VK_SUBGROUP_FEATURE_SHUFFLE_BIT;
+    const VkSubgroupFeatureFlags needed = VK_SUBGROUP_FEATURE_ARITHMETIC_BIT | VK_SUBGROUP_FEATURE_BALLOT_BIT |
+                                          VK_SUBGROUP_FEATURE_SHUFFLE_BIT | VK_SUBGROUP_FEATURE_VOTE_BIT;
     return subgroups.subgroupSupportedStages & VK_SHADER_STAGE_COMPUTE_BIT &&
            (subgroups.subgroupSupportedOperations & needed) == needed;
 }
@@ -355,7 +355,7 @@ static const char *device_missing(VkPhysicalDevice device, const gpu_desc *desc,
         properties.limits.maxPerStageDescriptorSamplers < GPU_SCENE_TEXTURES_MAX + GPU_BINDINGS_MAX)
         missing = list_append(arena, missing, arena_printf(arena, "%d sampled textures", GPU_SCENE_TEXTURES_MAX));
     if (!device_has_subgroups(device))
-        missing = list_append(arena, missing, "subgroup arithmetic, ballot and shuffle in compute shaders");
+        missing = list_append(arena, missing, "subgroup arithmetic, ballot, shuffle and vote in compute shaders");
     uint32_t timestamp_bits;
     if (device_queue_family(device, &timestamp_bits) == UINT32_MAX)
         missing = list_append(arena, missing, "a queue for graphics and compute with timestamps");
@@ -605,10 +605,6 @@ bool gpu_has_ray_pipelines(const gpu *gpu)
 uint32_t gpu_validation_messages(const gpu *gpu)
 {
     return gpu->validation_messages;
-}
-VkDevice gpu_device(const gpu *gpu)
-{
-    return gpu->device;
 }
 
 // ---- Timestamps

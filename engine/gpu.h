@@ -45,7 +45,6 @@ bool gpu_has_ray_pipelines(const gpu *gpu);
 uint32_t gpu_validation_messages(const gpu *gpu); // warnings and errors of the validation layer so far; each is logged
 // Prints one line a device to `out` with what it lacks. Returns the number of usable devices.
 uint32_t gpu_devices_print(void *out /* FILE * */);
-VkDevice gpu_device(const gpu *gpu); // for calls that this layer does not wrap
 
 // ---- Resources. Destruction is deferred until the commands submitted so far have finished.
 typedef struct gpu_buffer_desc {

@@ -124,7 +124,6 @@ static void order_execute(const frame_graph_context *context, void *user)
         [ORDER_PLACE] = ray_groups(pass->push.count),
     };
     const gpu_buffer header = frame_graph_buffer(context, pass->header);
-    gpu_memory_barrier(context->commands); // the graph lets shaders wait for the memory's last use, not transfers
     gpu_buffer_fill(context->commands, header, 0, gpu_buffer_size(context->gpu, header), 0);
     for (int step = 0; step < ORDER_STEPS; step++) {
         gpu_memory_barrier(context->commands);

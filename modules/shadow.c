@@ -76,7 +76,6 @@ static void priority_execute(const frame_graph_context *context, void *user)
 {
     const budget_pass *pass = user;
     const uint32_t push[] = {pass->interleave, filter_history_valid(context)};
-    gpu_memory_barrier(context->commands); // the graph lets shaders wait for the memory's last use, not transfers
     gpu_buffer_fill(context->commands, frame_graph_buffer(context, "shadow_priorities"), 0, BUDGET_HEADER_SIZE, 0);
     gpu_memory_barrier(context->commands);
     frame_graph_bind(context, pass->priority);

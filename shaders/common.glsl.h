@@ -23,8 +23,6 @@ uint hash(uint a, uint b, uint c, uint d) { return hash(hash(a, b, c), d); }
 
 // In [0,1): 24 bits, so never 1.
 float unit_float(uint bits) { return float(bits >> 8) * (1.0 / 16777216.0); }
-// In (0,1]: for logarithms.
-float unit_float_positive(uint bits) { return float((bits >> 8) + 1u) * (1.0 / 16777216.0); }
 
 // Octahedral map of unit vectors (Cigolle et al. 2014).
 vec2 octahedral_encode(vec3 n)
