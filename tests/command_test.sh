@@ -296,6 +296,8 @@ renders "$cornell" --size 64x36 --vpls 0 --frames 1 --eye 1000,1000,1000 --targe
 cmp dark.exr nothing.exr || fail "the scene without light is not black"
 renders "$work/dark.gltf" --size 64x36 --frames 1 --sun 0,0,-1,1000 -o sun.exr
 cmp -s dark.exr sun.exr && fail "--sun makes no light"
+renders "$work/dark.gltf" --size 64x36 --frames 1 --sun 0,0,-1e-30,1000 -o short.exr
+cmp sun.exr short.exr || fail "the length of --sun's direction matters"
 rm -f ./*
 
 echo "Ctrl-C writes what there is"

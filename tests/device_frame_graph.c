@@ -208,11 +208,10 @@ static void count_add(frame_graph *graph, counter *state, uint32_t width)
 {
     const frame_graph_resource_desc desc = frame_graph_image_of(VK_FORMAT_R32_UINT, width, HEIGHT);
     const frame_graph_pass_desc pass_desc = {
-        .name = "count", .kind = FRAME_GRAPH_COMPUTE, .execute = count_execute, .user = state};
+        .name = "count", .kind = FRAME_GRAPH_COMPUTE, .keep = true, .execute = count_execute, .user = state};
     frame_graph_pass *const pass = frame_graph_pass_add(graph, &pass_desc);
     frame_graph_read_previous(pass, "counts", ACCESS_SAMPLED);
     frame_graph_create_resource(pass, "counts", &desc, ACCESS_STORAGE_WRITE);
-    frame_graph_export(graph, "counts", ACCESS_TRANSFER_READ);
 }
 
 // The count in the first texel after one more frame.
@@ -220,6 +219,7 @@ static uint32_t count_frame(frame_graph *graph, counter *state, uint32_t width)
 {
     frame_graph_begin(graph);
     count_add(graph, state, width);
+    frame_graph_export(graph, "counts", ACCESS_TRANSFER_READ);
     CHECK(frame_graph_execute(graph));
     static uint32_t texels[HEIGHT * WIDTH];
     CHECK(gpu_image_read(device, frame_graph_find_image(graph, "counts"), VK_IMAGE_LAYOUT_TRANSFER_SRC_OPTIMAL, texels,
@@ -236,6 +236,17 @@ TEST(history_is_invalid_on_the_first_frame_and_after_a_resize)
     CHECK(count_frame(graph, &state, WIDTH) == 3 && state.valid);
     CHECK(count_frame(graph, &state, WIDTH / 2) == 1 && !state.valid);
     CHECK(count_frame(graph, &state, WIDTH / 2) == 2 && state.valid);
+    frame_graph_destroy(graph);
+}
+
+TEST(history_outlives_what_is_exported)
+{
+    frame_graph *const graph = frame_graph_create(device);
+    counter state;
+    frame_graph_begin(graph);
+    count_add(graph, &state, WIDTH);
+    CHECK(frame_graph_execute(graph));
+    CHECK(count_frame(graph, &state, WIDTH) == 2 && state.valid);
     frame_graph_destroy(graph);
 }
 
@@ -524,6 +535,7 @@ int main(void)
     RUN(chain_through_aliased_buffers_gives_the_right_bytes);
     RUN(chain_through_aliased_images_gives_the_right_texels);
     RUN(history_is_invalid_on_the_first_frame_and_after_a_resize);
+    RUN(history_outlives_what_is_exported);
     RUN(history_is_invalid_after_a_cut_and_after_a_frame_without_it);
     RUN(declaration_error_is_reported_and_keeps_the_history);
     RUN(host_pass_sees_what_the_device_made_and_the_device_what_it_made);
