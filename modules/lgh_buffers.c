@@ -12,6 +12,7 @@ static const char *const item_names[LGH_ITEM_COUNT] = {
     [LGH_KEYS] = "lgh_keys",
     [LGH_ORDER] = "lgh_order",
     [LGH_MASKS] = "lgh_masks",
+    [LGH_MASKS_FILLED] = "lgh_masks_filled",
     [LGH_RANKS] = "lgh_ranks",
     [LGH_VERTICES] = "lgh_vertices",
     [LGH_SUMS] = "lgh_sums",
@@ -20,8 +21,11 @@ static const char *const item_names[LGH_ITEM_COUNT] = {
     [LGH_STATE] = "lgh_state",
     [LGH_SLOT_CELLS] = "lgh_slot_cells",
     [LGH_CELL_MASKS] = "lgh_cell_masks",
+    [LGH_CELL_MASKS_FILLED] = "lgh_cell_masks_filled",
     [LGH_CELL_RANKS] = "lgh_cell_ranks",
     [LGH_CELL_STARTS] = "lgh_cell_starts",
+    [LGH_DIRTY_CELLS] = "lgh_dirty_cells",
+    [LGH_DIRTY_CELLS_FILLED] = "lgh_dirty_cells_filled",
     [LGH_LIGHTS] = "lgh_lights",
     [LGH_PARTIALS] = "lgh_partials",
     [LGH_TABLE] = "lgh_table",
@@ -30,7 +34,6 @@ static const char *const item_names[LGH_ITEM_COUNT] = {
     [LGH_NEW_KEYS] = "lgh_new_keys",
     [LGH_NEW_ORDER] = "lgh_new_order",
     [LGH_CHANGED] = "lgh_changed",
-    [LGH_DIRTY_CELLS] = "lgh_dirty_cells",
     [LGH_DIRTY_PLACES] = "lgh_dirty_places",
     [LGH_RANK_GROUPS] = "lgh_rank_groups",
     [LGH_CELL_GROUPS] = "lgh_cell_groups",
@@ -55,6 +58,7 @@ static bool copy_reserve(renderer *r, lgh_buffers *b, lgh_item item, uint32_t co
         return true;
     gpu_buffer_destroy(r->gpu, *buffer);
     *same = false;
+    b->is_used[item][copy] = false;
     const gpu_buffer_desc desc = {
         .name = item_names[item],
         .size = b->sizes[item],
@@ -92,6 +96,16 @@ bool lgh_buffers_flip(renderer *r, lgh_buffers *b)
         ok &= copy_reserve(r, b, item, b->current, &same);
     r->failed |= !ok;
     return ok;
+}
+
+bool lgh_buffers_fresh(lgh_buffers *b, lgh_item item)
+{
+    if (!item_is_held(b, item))
+        return true;
+    bool *is_used = &b->is_used[item][copy_of(b, item)];
+    const bool fresh = !*is_used;
+    *is_used = true;
+    return fresh;
 }
 
 void lgh_buffers_fini(renderer *r, lgh_buffers *b)

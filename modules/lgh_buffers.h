@@ -9,6 +9,7 @@ typedef enum lgh_item {
     LGH_KEYS, // uint[slots]: Morton codes of the VPLs' cells in S1, sorted
     LGH_ORDER, // uint[slots]: slots of the same VPLs; in a cell in ascending order
     LGH_MASKS,
+    LGH_MASKS_FILLED, // uint[]: a bit for each word of the masks that is not zero
     LGH_RANKS,
     LGH_VERTICES,
     LGH_SUMS,
@@ -19,8 +20,11 @@ typedef enum lgh_item {
     LGH_STATE,
     LGH_SLOT_CELLS, // uint[slots]: what key each slot has in the list
     LGH_CELL_MASKS,
+    LGH_CELL_MASKS_FILLED,
     LGH_CELL_RANKS,
     LGH_CELL_STARTS,
+    LGH_DIRTY_CELLS, // masks by Morton code of the cells whose VPLs changed
+    LGH_DIRTY_CELLS_FILLED,
     LGH_LIGHTS,
     LGH_HELD_COUNT,
     // Of one frame:
@@ -31,7 +35,6 @@ typedef enum lgh_item {
     LGH_NEW_KEYS, // the changed VPLs, sorted
     LGH_NEW_ORDER,
     LGH_CHANGED, // in the place of `vpl_changed`
-    LGH_DIRTY_CELLS, // masks by Morton code of the cells whose VPLs changed
     LGH_DIRTY_PLACES, // uint[]: vertices to build again, each level's at its first_light
     LGH_RANK_GROUPS,
     LGH_CELL_GROUPS,
@@ -40,6 +43,7 @@ typedef enum lgh_item {
 
 typedef struct lgh_buffers {
     gpu_buffer held[LGH_HELD_COUNT][2];
+    bool is_used[LGH_HELD_COUNT][2]; // the buffer has been written
     uint32_t current; // the copy that this frame writes
     // Of the current frame:
     bool hold; // all of the items that can be held; else header and state alone
@@ -52,6 +56,8 @@ typedef struct lgh_buffers {
 bool lgh_buffers_begin(renderer *r, lgh_buffers *b);
 // From now on this frame writes the other copies. False, and logged, when there is no memory.
 bool lgh_buffers_flip(renderer *r, lgh_buffers *b);
+// Whether nothing in the copy that this frame writes can be relied on; from now on it can.
+bool lgh_buffers_fresh(lgh_buffers *b, lgh_item item);
 void lgh_buffers_fini(renderer *r, lgh_buffers *b);
 
 // By its next binding the pass writes the item, or goes on with what the pass before made of it. The last one's has the

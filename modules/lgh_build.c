@@ -190,13 +190,20 @@ static void sort_list(const frame_graph_context *context, const lgh_build *b, lg
     }
 }
 
+// Of a mask of so many words.
+static void mask_clear(const frame_graph_context *context, lgh_build *b, lgh_pipeline clear, lgh_item mask,
+                       uint32_t words)
+{
+    const uint32_t push[] = {words, lgh_buffers_fresh(&b->buffers, mask)};
+    dispatch(context, b->pipelines[clear], push, sizeof push, div_up_u32(words, LGH_CLEAR_WORDS));
+}
+
 static void execute_sort(const frame_graph_context *context, void *user)
 {
-    const lgh_build *b = user;
-    const uint32_t words = lgh_cells_before(b->now.exponent + 1);
+    lgh_build *b = user;
     gpu_memory_barrier(context->commands);
     if (b->changed)
-        by_state(context, b, CLEAR_DIRTY, &words, 4, STATE_DISPATCH(cell_words));
+        mask_clear(context, b, CLEAR_DIRTY, LGH_DIRTY_CELLS, lgh_cells_before(b->now.exponent + 1));
     sort_list(context, b, b->changed ? KEYS_CHANGED : KEYS, 0);
 }
 
@@ -212,13 +219,12 @@ static void execute_merge(const frame_graph_context *context, void *user)
 
 static void count_levels(const frame_graph_context *context, const lgh_build *b, uint32_t stage)
 {
-    const uint32_t words = lgh_mask_words(b->now.exponent), mark[] = {b->now.exponent, stage};
+    const uint32_t mark[] = {b->now.exponent, stage};
     const struct {
         uint32_t stage, partial_count, exponent, levels, capacity, interleave, sorted;
         float alpha;
     } levels = {stage,           stretches_of(b),   b->now.exponent, b->now.levels,
                 b->now.capacity, b->now.interleave, b->now.sorted,   b->now.alpha};
-    by_state(context, b, CLEAR, &words, 4, STATE_DISPATCH(words[stage]));
     if (stage == 1) {
         const uint32_t keys[] = {b->now.slots, b->now.exponent, 0};
         by_state(context, b, KEYS, keys, sizeof keys, STATE_DISPATCH(stretches[1]));
@@ -229,17 +235,21 @@ static void count_levels(const frame_graph_context *context, const lgh_build *b,
 
 static void execute_levels(const frame_graph_context *context, void *user)
 {
+    lgh_build *b = user;
     gpu_memory_barrier(context->commands);
-    count_levels(context, user, 0);
+    mask_clear(context, b, CLEAR, LGH_MASKS, lgh_mask_words(b->now.exponent));
+    count_levels(context, b, 0);
 }
 
 static void execute_choose(const frame_graph_context *context, void *user)
 {
     const lgh_build *b = user;
     const grid_push grid = grid_push_of(b, 1);
+    const uint32_t clear[] = {lgh_mask_words(b->now.exponent), 0};
     gpu_memory_barrier(context->commands);
     by_state(context, b, BOUNDS, &b->now.slots, 4, STATE_DISPATCH(stretches[1]));
     by_state(context, b, GRID, &grid, sizeof grid, STATE_DISPATCH(once[1]));
+    by_state(context, b, CLEAR, clear, sizeof clear, STATE_DISPATCH(words));
     count_levels(context, b, 1);
     sort_list(context, b, KEYS, 1);
 }
@@ -265,8 +275,8 @@ static void execute_compact(const frame_graph_context *context, void *user)
 
 static void execute_cells(const frame_graph_context *context, void *user)
 {
-    const lgh_build *b = user;
-    by_header(context, b, CELLS_CLEAR, NULL, 0, offsetof(lgh_header, word_dispatch[1]));
+    lgh_build *b = user;
+    mask_clear(context, b, CELLS_CLEAR, LGH_CELL_MASKS, lgh_cell_words(b->now.exponent));
     by_state(context, b, CELLS_MARK, NULL, 0, STATE_DISPATCH(list));
     rank_bits(context, b, 1, lgh_cell_words(b->now.exponent));
     by_state(context, b, CELLS, NULL, 0, STATE_DISPATCH(list));
@@ -403,7 +413,7 @@ static void read_changed(const lgh_build *b, frame_graph_pass *p)
 
 // The passes that make the sorted list have one numbering of bindings:
 //   0 vpls  1 partials  2 slot_cells  3 table  4 header  5 state  6 changed
-//   7 keys  8 order  9 keys_swap  10 order_swap  11 dirty_cells  12 masks
+//   7 keys  8 order  9 keys_swap  10 order_swap  11 dirty_cells  12 dirty_cells_filled  13 masks  14 masks_filled
 
 static void declare_bounds(renderer *r, lgh_build *b)
 {
@@ -435,6 +445,7 @@ static void declare_sort(renderer *r, lgh_build *b)
     write(r, b, p, LGH_KEYS_SWAP);
     write(r, b, p, LGH_ORDER_SWAP);
     write(r, b, p, LGH_DIRTY_CELLS);
+    write(r, b, p, LGH_DIRTY_CELLS_FILLED);
 }
 
 static void declare_merge(renderer *r, lgh_build *b)
@@ -468,10 +479,13 @@ static void declare_levels(renderer *r, lgh_build *b, const char *name,
     write(r, b, p, LGH_KEYS_SWAP);
     write(r, b, p, LGH_ORDER_SWAP);
     read(b, p, LGH_DIRTY_CELLS);
+    read(b, p, LGH_DIRTY_CELLS_FILLED);
     lgh_buffers_write(r, &b->buffers, p, LGH_MASKS, last);
+    lgh_buffers_write(r, &b->buffers, p, LGH_MASKS_FILLED, last);
 }
 
-// Masks, header, ranks and group sums are the bindings 0..3 both here and for the cells, as the ranks' shaders want.
+// Masks, header, ranks, group sums and the masks' filled words are the bindings 0..3 and 5 both here and for the cells,
+// as the ranks' shaders want.
 static void declare_compact(renderer *r, lgh_build *b)
 {
     frame_graph_pass *p = add_pass(r, "lgh_build/compact", execute_compact, b);
@@ -480,6 +494,7 @@ static void declare_compact(renderer *r, lgh_build *b)
     write_last(r, b, p, LGH_RANKS);
     write(r, b, p, LGH_RANK_GROUPS);
     write_last(r, b, p, LGH_VERTICES);
+    read(b, p, LGH_MASKS_FILLED);
     frame_graph_read(p, "lgh_header", ACCESS_INDIRECT);
 }
 
@@ -491,6 +506,7 @@ static void declare_cells(renderer *r, lgh_build *b)
     write_last(r, b, p, LGH_CELL_RANKS);
     write(r, b, p, LGH_CELL_GROUPS);
     read(b, p, LGH_KEYS);
+    write_last(r, b, p, LGH_CELL_MASKS_FILLED);
     write_last(r, b, p, LGH_CELL_STARTS);
     frame_graph_read(p, "lgh_header", ACCESS_INDIRECT);
     lgh_buffers_read(&b->buffers, p, LGH_STATE, ACCESS_INDIRECT);
@@ -694,13 +710,15 @@ static void sizes_fill(lgh_build *b)
 {
     const lgh_signature *now = &b->now;
     const uint64_t slots = now->slots, mask_words = lgh_mask_words(now->exponent),
-                   cell_words = lgh_cell_words(now->exponent), lights = now->capacity;
+                   cell_words = lgh_cell_words(now->exponent), dirty_words = lgh_cells_before(now->exponent + 1),
+                   lights = now->capacity;
     const uint64_t digits = (uint64_t)div_up_u32(now->slots, SORT_BLOCK) << LGH_SORT_BITS, runs = slots / MERGE_RUN + 1;
     const uint64_t none = 16; // of what shaders declare and do not touch
     const uint64_t sizes[LGH_ITEM_COUNT] = {
         [LGH_KEYS] = 4 * slots,
         [LGH_ORDER] = 4 * slots,
         [LGH_MASKS] = 4 * mask_words,
+        [LGH_MASKS_FILLED] = mask_words / 8 + 16,
         [LGH_RANKS] = 4 * mask_words,
         [LGH_VERTICES] = 4 * lights,
         [LGH_SUMS] = sizeof(lgh_sums) * lights,
@@ -709,6 +727,7 @@ static void sizes_fill(lgh_build *b)
         [LGH_STATE] = sizeof(lgh_state),
         [LGH_SLOT_CELLS] = 4 * slots,
         [LGH_CELL_MASKS] = 4 * cell_words,
+        [LGH_CELL_MASKS_FILLED] = cell_words / 8 + 16,
         [LGH_CELL_RANKS] = 4 * cell_words,
         [LGH_CELL_STARTS] = 4 * (slots + 1),
         [LGH_LIGHTS] = sizeof(grid_light) * lights,
@@ -719,7 +738,8 @@ static void sizes_fill(lgh_build *b)
         [LGH_NEW_KEYS] = 4 * slots,
         [LGH_NEW_ORDER] = 4 * slots,
         [LGH_CHANGED] = none,
-        [LGH_DIRTY_CELLS] = b->changed ? 4ull * lgh_cells_before(now->exponent + 1) : none,
+        [LGH_DIRTY_CELLS] = b->buffers.hold ? 4 * dirty_words : none,
+        [LGH_DIRTY_CELLS_FILLED] = b->buffers.hold ? dirty_words / 8 + 16 : none,
         [LGH_DIRTY_PLACES] = b->changed ? 4 * lights : none,
         [LGH_RANK_GROUPS] = 4 * (mask_words / LGH_SCAN_WORDS + 1),
         [LGH_CELL_GROUPS] = 4 * (cell_words / LGH_SCAN_WORDS + 1),

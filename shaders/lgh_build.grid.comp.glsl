@@ -61,18 +61,18 @@ void set_dispatches(uint stage)
 {
     state.once[stage] = dispatch_of(1u);
     state.stretches[stage] = dispatch_of(push.partial_count);
-    uint levels = stage == 0u ? header.level_count : push.exponent + 1u;
-    state.words[stage] = dispatch_of((LGH_MASK_OFFSET[levels] + 255u) / 256u);
-    state.vpls[stage] = dispatch_of((header.vpl_count + 63u) / 64u);
+    if (stage == 1u)
+        state.words = dispatch_of((LGH_MASK_OFFSET[push.exponent + 1u] + uint(LGH_CLEAR_WORDS) - 1u) / uint(LGH_CLEAR_WORDS));
+    state.vpls[stage] = dispatch_of((header.vpl_count + 255u) / 256u);
 }
 
 void clear_dispatches()
 {
     for (uint stage = 0u; stage < 2u; stage++)
-        state.once[stage] = state.stretches[stage] = state.words[stage] = state.vpls[stage] = dispatch_of(0u);
+        state.once[stage] = state.stretches[stage] = state.vpls[stage] = dispatch_of(0u);
     for (uint i = 0u; i < uint(LGH_SORT_PASSES); i++)
         state.sort[i] = dispatch_of(0u);
-    state.runs = state.cell_words = dispatch_of(0u);
+    state.runs = state.words = dispatch_of(0u);
 }
 
 void main()
@@ -99,6 +99,5 @@ void main()
         return;
     for (uint i = 0u; i < sort_passes(header.level_count); i++)
         state.sort[i] = dispatch_of(sort_blocks(state.listed));
-    state.runs = dispatch_of((merge_runs(state.last_count) + 63u) / 64u);
-    state.cell_words = dispatch_of((LGH_CELL_OFFSET[header.level_count] + 255u) / 256u);
+    state.runs = dispatch_of((merge_runs(state.last_count) + 255u) / 256u);
 }

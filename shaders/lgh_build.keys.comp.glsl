@@ -11,6 +11,7 @@ layout(set = 0, binding = 8, scalar) buffer order_block { uint order[]; };
 layout(set = 0, binding = 9, scalar) buffer keys_swap_block { uint keys_swap[]; };
 layout(set = 0, binding = 10, scalar) buffer order_swap_block { uint order_swap[]; };
 layout(set = 0, binding = 11, scalar) buffer dirty_block { uint dirty_cells[]; };
+layout(set = 0, binding = 12, scalar) buffer filled_block { uint filled[]; };
 layout(push_constant, scalar) uniform push_block {
     uint slot_count;
     uint exponent; // of the keys' cells; LGH_NO_EXPONENT: S1's
@@ -48,8 +49,11 @@ void mark_dirty(uint cell)
     if (cell == NO_CELL)
         return;
     for (uint c = header.level_count; c-- > 0u; cell >>= 3) {
-        uint flag = 1u << (cell & 31u);
-        if ((atomicOr(dirty_cells[LGH_CELL_OFFSET[c] + (cell >> 5)], flag) & flag) != 0u)
+        uint word = LGH_CELL_OFFSET[c] + (cell >> 5), flag = 1u << (cell & 31u);
+        uint before = atomicOr(dirty_cells[word], flag);
+        if (before == 0u)
+            atomicOr(filled[word >> 5], 1u << (word & 31u));
+        if ((before & flag) != 0u)
             break;
     }
 }

@@ -74,11 +74,9 @@ void fill_header(uint levels)
     header.light_count = first;
     header.word_count = LGH_MASK_OFFSET[levels];
     uint words[2] = uint[](header.word_count, levels > 0u ? cell_words(levels - 1u) : 0u);
-    for (uint i = 0u; i < 2u; i++) {
-        header.word_dispatch[i] = dispatch_of((words[i] + 255u) / 256u);
+    for (uint i = 0u; i < 2u; i++)
         header.scan_dispatch[i] = dispatch_of((words[i] + LGH_SCAN_WORDS - 1u) / LGH_SCAN_WORDS);
-    }
-    header.light_dispatch = dispatch_of((first + 63u) / 64u);
+    header.light_dispatch = dispatch_of((first + 255u) / 256u);
     header.first_dispatch = dispatch_of(levels > 0u ? (state.counts[levels - 1u] + 63u) / 64u : 0u);
     uint instances = 0u;
     for (uint c = 1u; c + 1u < levels; c++)
@@ -99,7 +97,7 @@ void main()
     }
     uint levels = push.stage == 0u ? header.level_count : choose_levels();
     fill_header(levels);
-    state.list = dispatch_of((header.vpl_count + 63u) / 64u);
+    state.list = dispatch_of((header.vpl_count + 255u) / 256u);
     if (push.stage == 0u)
         return;
     state.density = levels > 0u ? density_of(levels) : 0.0;

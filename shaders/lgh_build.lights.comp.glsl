@@ -3,7 +3,7 @@
 #extension GL_GOOGLE_include_directive : require
 #include "lgh.glsl.h"
 
-layout(local_size_x = 64) in;
+layout(local_size_x = 256) in;
 layout(set = 0, binding = 0, scalar) readonly buffer header_block { lgh_header header; };
 layout(set = 0, binding = 1, scalar) readonly buffer vertices_block { uint vertices[]; };
 layout(set = 0, binding = 2, scalar) readonly buffer sums_block { lgh_sums sums[]; };
@@ -11,7 +11,7 @@ layout(set = 0, binding = 3, scalar) writeonly buffer lights_block { grid_light 
 
 void main()
 {
-    uint i = gl_WorkGroupID.y * 65535u * 64u + gl_GlobalInvocationID.x;
+    uint i = gl_WorkGroupID.y * 65535u * 256u + gl_GlobalInvocationID.x;
     if (i >= header.light_count)
         return;
     uint c = light_exponent(header, i);

@@ -4,9 +4,10 @@
 #extension GL_GOOGLE_include_directive : require
 #include "lgh.glsl.h"
 
-layout(local_size_x = 64) in;
+layout(local_size_x = 256) in;
 layout(set = 0, binding = 7, scalar) readonly buffer keys_block { uint keys[]; };
-layout(set = 0, binding = 12, scalar) buffer masks_block { uint masks[]; };
+layout(set = 0, binding = 13, scalar) buffer masks_block { uint masks[]; };
+layout(set = 0, binding = 14, scalar) buffer filled_block { uint filled[]; };
 layout(set = 0, binding = 4, scalar) readonly buffer header_block { lgh_header header; };
 layout(set = 0, binding = 5, scalar) buffer state_block { lgh_state state; };
 layout(push_constant, scalar) uniform push_block { uint finest, stage; } push; // stage 1: keys of the exponent `finest`
@@ -18,21 +19,22 @@ void mark_cell(uint c, uvec3 cell)
     uint marked = 0u;
     for (uint corner = 0u; corner < 8u; corner++) {
         uint bit = mask_bit(c, cell + (uvec3(corner, corner >> 1, corner >> 2) & 1u));
-        uint flag = 1u << (bit & 31u);
-        if ((masks[bit >> 5] & flag) == 0u && (atomicOr(masks[bit >> 5], flag) & flag) == 0u)
+        uint word = bit >> 5, flag = 1u << (bit & 31u);
+        if ((masks[word] & flag) != 0u)
+            continue;
+        uint before = atomicOr(masks[word], flag);
+        if (before == 0u)
+            atomicOr(filled[word >> 5], 1u << (word & 31u));
+        if ((before & flag) == 0u)
             marked++;
     }
     if (marked > 0u)
-        atomicAdd(group_counts[c], marked);
+        atomicAdd(state.counts[c], marked);
 }
 
 void main()
 {
-    uint thread = gl_LocalInvocationIndex;
-    if (thread < LGH_EXPONENTS)
-        group_counts[thread] = 0u;
-    barrier();
-    uint i = gl_WorkGroupID.y * 65535u * 64u + gl_GlobalInvocationID.x;
+    uint i = gl_WorkGroupID.y * 65535u * 256u + gl_GlobalInvocationID.x;
     uint finest = push.stage != 0u ? push.finest : header.level_count - 1u;
     if (i < header.vpl_count) {
         uint key = keys[i];
@@ -44,7 +46,4 @@ void main()
             mark_cell(c, morton_decode(key >> shift));
         }
     }
-    barrier();
-    if (thread < LGH_EXPONENTS && group_counts[thread] > 0u)
-        atomicAdd(state.counts[thread], group_counts[thread]);
 }

@@ -5,7 +5,7 @@
 
 #include "lgh_build.state.glsl.h"
 
-layout(local_size_x = 64) in;
+layout(local_size_x = 256) in;
 layout(set = 0, binding = 0, scalar) readonly buffer changed_block { uint changed[]; };
 layout(set = 0, binding = 5, scalar) readonly buffer state_block { lgh_state state; };
 layout(set = 0, binding = 2, scalar) readonly buffer old_order_block { uint old_order[]; };
@@ -13,7 +13,7 @@ layout(set = 0, binding = 3, scalar) buffer table_block { uint table[]; }; // pa
 
 bool is_kept(uint i) { return (changed[old_order[i] >> 5] >> (old_order[i] & 31u) & 1u) == 0u; }
 
-uint merge_run() { return gl_WorkGroupID.y * 65535u * 64u + gl_GlobalInvocationID.x; }
+uint merge_run() { return gl_WorkGroupID.y * 65535u * 256u + gl_GlobalInvocationID.x; }
 uint run_last(uint run) { return min((run + 1u) * MERGE_RUN, state.last_count); }
 
 #endif

@@ -5,7 +5,7 @@
 #extension GL_GOOGLE_include_directive : require
 #include "lgh.glsl.h"
 
-layout(local_size_x = 64) in;
+layout(local_size_x = 256) in;
 layout(set = 0, binding = 0, scalar) readonly buffer header_block { lgh_header header; };
 layout(set = 0, binding = 1, scalar) buffer state_block { lgh_state state; };
 layout(set = 0, binding = 2, scalar) readonly buffer vertices_block { uint vertices[]; };
@@ -59,7 +59,7 @@ uvec4 moved_samples(uint c, uvec4 old)
 
 void main()
 {
-    uint place = gl_WorkGroupID.y * 65535u * 64u + gl_GlobalInvocationID.x;
+    uint place = gl_WorkGroupID.y * 65535u * 256u + gl_GlobalInvocationID.x;
     if (place >= header.light_count)
         return;
     uint c = light_exponent(header, place);

@@ -6,8 +6,9 @@
 void main()
 {
     uint rank = run_rank();
-    for (uint i = run_first(); i < run_last(); i++) {
-        ranks[i] = rank;
-        rank += uint(bitCount(masks[i]));
+    for (uint words = run_filled(); words != 0u; words &= words - 1u) {
+        uint word = run_first() + uint(findLSB(words));
+        ranks[word] = rank;
+        rank += uint(bitCount(masks[word]));
     }
 }

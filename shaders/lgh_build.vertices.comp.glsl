@@ -9,7 +9,8 @@ void main()
 {
     uint rank = run_rank();
     uint c = 0u;
-    for (uint word = run_first(); word < run_last(); word++) {
+    for (uint words = run_filled(); words != 0u; words &= words - 1u) {
+        uint word = run_first() + uint(findLSB(words));
         ranks[word] = rank;
         while (word >= LGH_MASK_OFFSET[c + 1u])
             c++;

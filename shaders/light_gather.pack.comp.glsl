@@ -5,7 +5,7 @@
 #include "light_gather.glsl.h"
 #include "reservoir.glsl.h"
 
-layout(local_size_x = 64) in;
+layout(local_size_x = 256) in;
 layout(set = 0, binding = 0, scalar) readonly buffer header_block { lgh_header header; };
 layout(set = 0, binding = 1, scalar) readonly buffer grid_lights_block { grid_light grid_lights[]; };
 layout(set = 0, binding = 2, scalar) readonly buffer vpls_block { vpl vpls[]; };
@@ -19,7 +19,7 @@ const vec3 OUT_OF_REACH = vec3(1e30); // of lights that send nothing
 
 void main()
 {
-    uint i = gl_WorkGroupID.y * 65535u * 64u + gl_GlobalInvocationID.x;
+    uint i = gl_WorkGroupID.y * 65535u * 256u + gl_GlobalInvocationID.x;
     if (i >= (VPLS ? header.vpl_count : header.light_count))
         return;
     gather_light g;

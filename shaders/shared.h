@@ -297,6 +297,7 @@ SHARED_STRUCT(probe) {
 
 #define LGH_EXPONENTS 9       // candidate exponents 0..8, so at most 9 levels and 512 cells along an axis of the grid
 #define LGH_SCAN_WORDS 2048   // mask words that one workgroup scans
+#define LGH_CLEAR_WORDS 32768 // ... and that one clears: 128 an invocation
 #define LGH_STRETCH 4096      // VPL slots that one workgroup looks through
 #define LGH_SORT_BITS 4       // of the key, in one pass of the sort
 #define LGH_SORT_PASSES 7     // for keys of 3 LGH_EXPONENTS bits
@@ -353,15 +354,14 @@ SHARED_STRUCT(lgh_header) {
     uint vpl_count;      // occupied slots
     uint word_count;     // vertex mask words of the levels in use
     lgh_level levels[LGH_EXPONENTS];
-    lgh_dispatch word_dispatch[2]; // [0] vertex masks, [1] cell masks of S1: 256 words per workgroup
-    lgh_dispatch scan_dispatch[2]; // the same, LGH_SCAN_WORDS per workgroup
+    lgh_dispatch scan_dispatch[2]; // [0] vertex masks, [1] cell masks of S1: LGH_SCAN_WORDS per workgroup
     lgh_dispatch light_dispatch;  // one invocation per grid light
     lgh_dispatch first_dispatch;  // one invocation per vertex of S1
     lgh_dispatch restrict_dispatch[LGH_EXPONENTS]; // [t] builds S_(t+1), t >= 1: one invocation per vertex
     lgh_dispatch gather_dispatch[LGH_EXPONENTS];   // the same by one workgroup per vertex
     lgh_draw volume_draw;       // light volumes of the levels between S1 and the top: 14 vertices an instance
     lgh_draw volume_first_draw; // those of S1, where it is not the top
-} SHARED_END(lgh_header, 32 + 16 * LGH_EXPONENTS + 64 + 32 + 32 * LGH_EXPONENTS + 32)
+} SHARED_END(lgh_header, 32 + 16 * LGH_EXPONENTS + 64 + 32 * LGH_EXPONENTS + 32)
 
 SHARED_STRUCT(lgh_partial) { // of a stretch of VPL slots
     SHARED_VEC3(low);  // bounds of its VPLs
@@ -381,13 +381,12 @@ SHARED_STRUCT(lgh_state) {
     uint dirty[LGH_EXPONENTS];  // incremental: vertices to build again
     lgh_dispatch once[2];
     lgh_dispatch stretches[2]; // LGH_STRETCH slots per workgroup
-    lgh_dispatch words[2];     // vertex masks, 256 words per workgroup
-    lgh_dispatch vpls[2];      // the list of VPLs, 64 per workgroup
+    lgh_dispatch words;        // vertex masks that stage 1 clears, LGH_CLEAR_WORDS per workgroup
+    lgh_dispatch vpls[2];      // the list of VPLs, 256 per workgroup
     lgh_dispatch sort[LGH_SORT_PASSES]; // by passes that follow
-    lgh_dispatch cell_words;   // masks of the dirty cells, 256 words per workgroup
     lgh_dispatch runs;         // of last frame's sorted list, for merging
-    lgh_dispatch list;         // the final sorted list of VPLs, 64 per workgroup
+    lgh_dispatch list;         // the final sorted list of VPLs, 256 per workgroup
     lgh_dispatch dirty_dispatch[LGH_EXPONENTS]; // 64 vertices per workgroup
-} SHARED_END(lgh_state, 16 + 8 * LGH_EXPONENTS + 16 * (11 + LGH_SORT_PASSES + LGH_EXPONENTS))
+} SHARED_END(lgh_state, 16 + 8 * LGH_EXPONENTS + 16 * (9 + LGH_SORT_PASSES + LGH_EXPONENTS))
 
 #endif

@@ -155,6 +155,14 @@ typedef struct hierarchy {
     size_t sizes[countof(outputs)];
 } hierarchy;
 
+// Words of a mask that are zero have no rank.
+static void ranks_clear(uint32_t *ranks, const uint32_t *mask, uint32_t words)
+{
+    for (uint32_t i = 0; i < words; i++)
+        if (mask[i] == 0)
+            ranks[i] = 0;
+}
+
 static uint32_t cell_count(const lgh_header *header, const uint32_t *cell_masks, uint32_t words)
 {
     uint32_t count = 0;
@@ -189,6 +197,8 @@ static hierarchy hierarchy_read(renderer *r)
         (cell_count(header, h.bytes[9], words) + 1) * 4ull,
     };
     _Static_assert(countof(sizes) == countof(outputs), "one each");
+    ranks_clear(h.bytes[5], h.bytes[4], header->word_count);
+    ranks_clear(h.bytes[10], h.bytes[9], words);
     for (size_t i = 0; i < countof(sizes); i++) {
         CHECK(sizes[i] <= h.sizes[i]);
         h.sizes[i] = sizes[i];
@@ -472,44 +482,41 @@ TEST(the_validation_layer_has_nothing_to_say)
 
 enum { BENCH_PASSES = 64 };
 
-// The least time of each pass over the rounds: what other processes on the machine add falls away.
-typedef struct bench_times {
+typedef struct bench_times { // of one round
     char names[BENCH_PASSES][40];
     double milliseconds[BENCH_PASSES];
     int count;
+    double sum;
 } bench_times;
 
-static void times_add(bench_times *times, const renderer *r)
+static bench_times times_read(const renderer *r)
 {
     uint32_t count;
     const frame_graph_timing *timings = frame_graph_timings(r->graph, &count);
-    int pass = 0;
+    bench_times times = {0};
     for (uint32_t i = 0; i < count; i++) {
         if (strncmp(timings[i].name, "lgh_build/", 10) != 0)
             continue;
-        double *least = &times->milliseconds[pass];
-        *least = pass < times->count ? fmin(*least, timings[i].milliseconds) : timings[i].milliseconds;
-        snprintf(times->names[pass++], sizeof times->names[0], "%s", timings[i].name + 10);
+        snprintf(times.names[times.count], sizeof times.names[0], "%s", timings[i].name + 10);
+        times.milliseconds[times.count++] = timings[i].milliseconds;
+        times.sum += timings[i].milliseconds;
     }
-    times->count = pass;
-}
-
-static double times_sum(const bench_times *times)
-{
-    double sum = 0;
-    for (int i = 0; i < times->count; i++)
-        sum += times->milliseconds[i];
-    return sum;
+    return times;
 }
 
 static void times_print(const bench_times *times, const char *name, double full)
 {
-    const double sum = times_sum(times);
-    printf("  %-22s %8.2f ms, %.3f of a full build:", name, sum, sum / full);
+    printf("  %-22s %8.2f ms, %.3f of a full build:", name, times->sum, times->sum / full);
     for (int i = 0; i < times->count; i++)
-        if (times->milliseconds[i] > 0.02 * sum)
+        if (times->milliseconds[i] > 0.02 * times->sum)
             printf(" %s %.2f", times->names[i], times->milliseconds[i]);
     printf("\n");
+}
+
+static int compare_times(const void *a, const void *b)
+{
+    const double x = ((const bench_times *)a)->sum, y = ((const bench_times *)b)->sum;
+    return (x > y) - (x < y);
 }
 
 static int compare_doubles(const void *a, const void *b)
@@ -518,7 +525,8 @@ static int compare_doubles(const void *a, const void *b)
 }
 
 // One VPL in a hundred sends out another light from another place nearby: any of them, or those nearest to one of them.
-static void bench_change(given *g, const uint32_t *occupied, uint32_t count, bool together)
+static void bench_change(given *g, const frame_constants *scene, const uint32_t *occupied, uint32_t count,
+                         bool together)
 {
     const float *centre = g->data[occupied[random_below(g, count)]].position;
     float limit = INFINITY;
@@ -539,7 +547,8 @@ static void bench_change(given *g, const uint32_t *occupied, uint32_t count, boo
             square += (light.position[k] - origin[k]) * (light.position[k] - origin[k]);
         if (together ? square >= limit : random_below(g, 100) != 0)
             continue;
-        light.position[i % 3] += random_float(g, -0.02f, 0.02f);
+        float *x = &light.position[i % 3];
+        *x = fminf(fmaxf(*x + random_float(g, -0.02f, 0.02f), scene->scene_min[i % 3]), scene->scene_max[i % 3]);
         light.color[0] *= random_float(g, 0.5f, 1);
         slot_change(g, occupied[i], light);
     }
@@ -548,8 +557,8 @@ static void bench_change(given *g, const uint32_t *occupied, uint32_t count, boo
 
 static void bench(uint32_t slots)
 {
-    enum { KINDS = 4 };
-    const int rounds = slots > 200000 ? 7 : 25;
+    enum { KINDS = 4, ROUNDS = 25 };
+    const int rounds = slots > 200000 ? 9 : ROUNDS;
     static const char *const names[KINDS] = {"full", "1 % anywhere", "1 % in one place", "none"};
     const render_settings s = settings_of(slots);
     fixture f = fixture_create(SCENES "atrium.glb", &s);
@@ -567,18 +576,20 @@ static void bench(uint32_t slots)
             occupied[count++] = i;
     }
     slots_upload(g);
-    bench_times times[KINDS] = {0};
+    static bench_times times[KINDS][ROUNDS];
     for (int round = -1; round < rounds; round++) // the first warms up
         for (int kind = 0; kind < KINDS; kind++) {
             if (kind == 1 || kind == 2)
-                bench_change(g, occupied, count, kind == 2);
+                bench_change(g, &f.r->constants, occupied, count, kind == 2);
             render(&f, kind == 0 ? VPLS_ALL : kind == 3 ? VPLS_NONE : VPLS_SOME);
             if (round >= 0)
-                times_add(&times[kind], f.r);
+                times[kind][round] = times_read(f.r);
         }
     printf("  %u slots, %u VPLs\n", slots, count);
-    for (int kind = 0; kind < KINDS; kind++)
-        times_print(&times[kind], names[kind], times_sum(&times[0]));
+    for (int kind = 0; kind < KINDS; kind++) {
+        qsort(times[kind], (size_t)rounds, sizeof times[kind][0], compare_times);
+        times_print(&times[kind][rounds / 2], names[kind], times[0][rounds / 2].sum); // the median
+    }
     free(traced);
     free(occupied);
     fixture_destroy(&f);
