@@ -39,10 +39,20 @@ static const char *const item_names[LGH_ITEM_COUNT] = {
     [LGH_CELL_GROUPS] = "lgh_cell_groups",
 };
 
-// History of the grid itself is kept even where every frame builds all.
+// Even where every frame builds all, it goes on from the grid of the last, and clears no more of a mask than is filled.
 static bool item_is_held(const lgh_buffers *b, lgh_item item)
 {
-    return item == LGH_HEADER || item == LGH_STATE || (b->hold && item < LGH_HELD_COUNT);
+    switch (item) {
+    case LGH_HEADER:
+    case LGH_STATE:
+    case LGH_MASKS:
+    case LGH_MASKS_FILLED:
+    case LGH_CELL_MASKS:
+    case LGH_CELL_MASKS_FILLED:
+        return true;
+    default:
+        return b->hold && item < LGH_HELD_COUNT;
+    }
 }
 
 static uint32_t copy_of(const lgh_buffers *b, lgh_item item)

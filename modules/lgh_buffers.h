@@ -46,7 +46,7 @@ typedef struct lgh_buffers {
     bool is_used[LGH_HELD_COUNT][2]; // the buffer has been written
     uint32_t current; // the copy that this frame writes
     // Of the current frame:
-    bool hold; // all of the items that can be held; else header and state alone
+    bool hold; // all of the items that can be held; else header, state and masks alone
     uint64_t sizes[LGH_ITEM_COUNT]; // bytes
     uint32_t versions[LGH_ITEM_COUNT]; // how often a pass made the item
 } lgh_buffers;
