@@ -90,7 +90,7 @@ static void execute_pack(const frame_graph_context *context, void *user)
     if (!pass->next.id)
         return;
     bind(context, pass->next, &pass->push);
-    gpu_dispatch(context->commands, div_up_u32(pass->push.slot_count, 64), 1, 1);
+    gpu_dispatch(context->commands, div_up_u32(pass->push.slot_count, 256), 1, 1);
 }
 
 static void execute_mark(const frame_graph_context *context, void *user)
