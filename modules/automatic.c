@@ -19,6 +19,7 @@ enum {
 static const double ms_high = 1.07, ms_low = 0.93, ms_aim = 0.98; // of target_ms
 static const double error_high = 1.12, error_low = 1 / 1.15, error_aim = 0.98; // of target_error
 static const double gain_needed = 0.9; // of the error, for a change while the time is met
+static const double leap = 5; // octaves of VPLs, at most, in a change
 static const double nearly = 1.2; // off the target by less: changes go a little way
 static const double view_changed = 1.5; // off by so much after it was met: another view, start anew
 static const double cost_step = 3; // towards an error, of the modelled time
@@ -57,24 +58,32 @@ static double rays_of(const render_settings *s)
     return s->ray_budget > 0 ? fmin((double)s->ray_budget, s->shadow_samples) : s->shadow_samples;
 }
 
-// ---- Models. Milliseconds on two CPU cores; only ratios matter where times are measured. That alpha doubled triples
-// the lighting is the paper's figure (Lin and Yuksel 2019, section 5), and so is its growth with the logarithm of the
-// VPLs.
+// ---- Models. Milliseconds on two CPU cores, as measured in atrium and Sponza, 1,000 to 1,000,000 VPLs, alpha 1 to 4,
+// all interleavings, 1/4 to 8 rays; only ratios matter where times are measured.
+
+// Lights at a pixel: so many of each level (Lin and Yuksel 2019, section 4), but no more than there are, and those that
+// are too few to share out among tiles. 4x4 tiles have a sixteenth, each at half as much again.
+static double model_lights(const render_settings *s)
+{
+    const double reached = 12 * pow((double)s->alpha, 1.9) * log2(2 + 0.125 * s->vpls), all = 0.5 * s->vpls;
+    const double tiles = s->interleave, lights = reached * all / (reached + all);
+    return lights * pow(tiles, -1.75) + (tiles > 1 ? 10 : 0);
+}
 
 static double model_milliseconds(const render_settings *s, automatic_group group)
 {
     const double megapixels = 1e-6 * s->width * s->height, tiles = s->interleave;
     switch (group) {
     case AUTOMATIC_VPLS:
-        return 1 + 5e-4 * s->vpls;
-    case AUTOMATIC_LIGHTING:
-        // Measured: 2x2 tiles take 0.32 of the time, 4x4 0.15.
-        return 26 * megapixels * pow((double)s->alpha, 1.58) * log2(2.0 + s->vpls) * (1 + 0.1 * s->shadow_samples) *
-               (1 / (tiles * sqrt(tiles)));
+        return 20 + 6e-4 * s->vpls;
+    case AUTOMATIC_LISTS:
+        return 0.3 + 2.2e-4 * s->vpls + 20 * megapixels;
+    case AUTOMATIC_LIGHTING: // which has VPLs one by one, too
+        return megapixels * (200 + 7e-4 * s->vpls + 6.3 * (1 + 0.05 * s->shadow_samples) * model_lights(s));
     case AUTOMATIC_TILES:
-        return tiles > 1 ? 60 * megapixels : 0;
-    case AUTOMATIC_SHADOWS:
-        return 150 * megapixels * (0.25 + rays_of(s));
+        return tiles > 1 ? megapixels * (30 + 15 * tiles) : 0;
+    case AUTOMATIC_SHADOWS: // a budget has to be shared out
+        return megapixels * (60 + 145 * rays_of(s) + (s->ray_budget > 0 ? 90 : 0));
     case AUTOMATIC_FIXED:
     case AUTOMATIC_GROUPS:
         return 500 * megapixels;
@@ -141,16 +150,22 @@ double automatic_probes_error(const automatic_probes *sum, double *standard_erro
 automatic_group automatic_group_of(const char *pass)
 {
     static const struct {
-        const char *module;
+        const char *name;
         automatic_group group;
-    } modules[] = {
-        {"vpl_trace", AUTOMATIC_VPLS},        {"lgh_build", AUTOMATIC_VPLS},   {"light_volume", AUTOMATIC_LIGHTING},
-        {"light_gather", AUTOMATIC_LIGHTING}, {"interleave", AUTOMATIC_TILES}, {"shadow", AUTOMATIC_SHADOWS},
+    } names[] = {
+        {"vpl_trace", AUTOMATIC_VPLS},
+        {"lgh_build", AUTOMATIC_VPLS},
+        {"light_volume", AUTOMATIC_LIGHTING},
+        {"light_gather/gather", AUTOMATIC_LIGHTING},
+        {"light_gather", AUTOMATIC_LISTS},
+        {"interleave", AUTOMATIC_TILES},
+        {"shadow", AUTOMATIC_SHADOWS},
     };
-    const size_t length = strcspn(pass, "/");
-    for (size_t i = 0; i < countof(modules); i++)
-        if (strlen(modules[i].module) == length && strncmp(modules[i].module, pass, length) == 0)
-            return modules[i].group;
+    for (size_t i = 0; i < countof(names); i++) {
+        const size_t length = strlen(names[i].name);
+        if (strncmp(names[i].name, pass, length) == 0 && (pass[length] == '\0' || pass[length] == '/'))
+            return names[i].group;
+    }
     return AUTOMATIC_FIXED;
 }
 
@@ -325,19 +340,22 @@ static bool is_at_most(const render_settings *s, const render_settings *other)
            rays_of(s) <= rays_of(other);
 }
 
-// Where the time is nearly right a choice goes only a little way from the last: the models are fitted there, and what
-// they say of settings far away is not worth the frames that it takes to find out.
+// What may follow the current settings. Not VPLs by orders of magnitude more or fewer: what they cost in a scene shows
+// once there are more. Back to the target after a change it only takes, or only gives: what it would trade, the models do
+// not know well enough. And where the time is nearly right it goes only a little way: they are fitted there, and what they
+// say of settings far away is not worth the frames that it takes to find out.
 static bool is_near(const automatic *a, const render_settings *s)
 {
-    const double ms = automatic_milliseconds(a);
-    if (a->changes == 0 || ms > nearly * a->target_ms || ms * nearly < a->target_ms)
+    const double ms = automatic_milliseconds(a), octaves = fabs(log2((double)s->vpls / a->current.vpls));
+    if (octaves > leap)
+        return false;
+    if (a->changes == 0)
         return true;
-    // Back to the target it only takes, or only gives: what it would trade, it does not know well enough.
     if ((ms > ms_high * a->target_ms && !is_at_most(s, &a->current)) ||
         (ms < ms_low * a->target_ms && !is_at_most(&a->current, s)))
         return false;
-    return fabs(log2((double)s->vpls / a->current.vpls)) <= 2.1 &&
-           fabs(log2((double)(s->alpha / a->current.alpha))) <= 0.6;
+    const bool far = ms > nearly * a->target_ms || ms * nearly < a->target_ms;
+    return far || (octaves <= 2.1 && fabs(log2((double)(s->alpha / a->current.alpha))) <= 0.6);
 }
 
 // What the fastest choice takes.
@@ -372,12 +390,14 @@ static bool plan_within(const automatic *a, double most, render_settings *best)
     return isfinite(best_score);
 }
 
-// Where nothing is fast enough, within little more than the least time.
+// Where nothing is fast enough, within little more than the least time, but not off the target for that.
 static render_settings plan_for_time(const automatic *a)
 {
     render_settings best = a->current;
-    if (!plan_within(a, ms_aim * a->target_ms, &best))
-        plan_within(a, 1.1 * milliseconds_least(a), &best);
+    if (plan_within(a, ms_aim * a->target_ms, &best))
+        return best;
+    const double least = milliseconds_least(a), most = ms_high * a->target_ms;
+    plan_within(a, least < most ? most : 1.1 * least, &best);
     return best;
 }
 
@@ -481,7 +501,7 @@ static bool is_worth_it(const automatic *a, const render_settings *next, double 
         return automatic_predict_milliseconds(a, next) < 0.95 * ms;
     if (ms < ms_low * a->target_ms)
         return gain < 0.999 || (gain <= 1 && model_cost(next) < 0.7 * model_cost(&a->current));
-    return gain < gain_needed;
+    return gain < gain_needed && automatic_predict_milliseconds(a, next) <= ms_high * a->target_ms;
 }
 
 // Frames that a time needs to call for a change: few where it is far off or nothing was chosen yet, else a whole

