@@ -5,7 +5,8 @@
 // (`lgh_masks`), stored in blocks of 8^3 vertices, Morton order inside a block, blocks in raster order (near enough to a
 // Morton curve for dealing lights to interleaved tiles, without its powers of two), exponents 0, 1, ...
 // one after the other. `lgh_ranks` counts the bits before each word over the whole array, so a vertex's rank is at once
-// its place in the merged arrays (`lgh_vertices`, `lgh_sums`, `lgh_lights`): the top level first, S1 last.
+// its place in the merged arrays (`lgh_vertices`, `lgh_sums`, `lgh_lights`): the top level first, S1 last. Words without a
+// bit, which are nearly all, have no rank, and no step looks at them: `lgh_masks_filled` has a bit for each of the others.
 #ifndef LGH_GLSL_H
 #define LGH_GLSL_H
 

@@ -61,8 +61,9 @@ void set_dispatches(uint stage)
 {
     state.once[stage] = dispatch_of(1u);
     state.stretches[stage] = dispatch_of(push.partial_count);
+    uint words = LGH_MASK_OFFSET[push.exponent + 1u];
     if (stage == 1u)
-        state.words = dispatch_of((LGH_MASK_OFFSET[push.exponent + 1u] + uint(LGH_CLEAR_WORDS) - 1u) / uint(LGH_CLEAR_WORDS));
+        state.words = dispatch_of((words + uint(LGH_CLEAR_WORDS) - 1u) / uint(LGH_CLEAR_WORDS));
     state.vpls[stage] = dispatch_of((header.vpl_count + 255u) / 256u);
 }
 
